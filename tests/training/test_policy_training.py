@@ -32,7 +32,6 @@ from pushplan.training.policies.dataset import (
 from pushplan.training.policies.demonstrations import action_chunks
 from pushplan.training.policies.environment import TRAINING_SEEDS, TrainingEnv
 from pushplan.training.policies.options import OPTIONS
-from pushplan.training.policies.replay import Lookahead, ReplayBuffer
 from pushplan.training.policies.run import CurvePoint, TrainingRun
 from pushplan.training.policies.training import train_policy
 from pushplan.world import InvalidInputError, SchemaError, UnknownNameError
@@ -425,87 +424,100 @@ class TestDataset:
         assert np.array_equal(made[0].actions, next(episodes(data)).actions)
 
 
-class TestReplay:
-    def test_the_oldest_are_forgotten(self):
-        buffer = ReplayBuffer(3, (2,))
-        for i in range(5):
-            buffer.add(np.full(2, i), i, float(i), np.full(2, i + 1), 0.5 * (i < 4))
-        assert buffer.count == 3
-        seen, actions, rewards, following, discounts = buffer.sample(50, np.random.default_rng(0))
-        assert set(actions.tolist()) == {2, 3, 4}
-        assert (seen[:, 0] == actions).all() and (following[:, 0] == actions + 1).all()
-        assert (rewards == actions).all() and (discounts == 0.5 * (actions < 4)).all()
-        other = ReplayBuffer(3, (2,))
-        other.restore(buffer.state())
-        assert np.array_equal(other.arrays["seen"], buffer.arrays["seen"])
-        assert other.position == buffer.position
+def sam_learner(folder: Path, **changes: object):
+    """A learner whose model can be trained by hand."""
+    from stable_baselines3.common.logger import configure
 
-    @pytest.mark.parametrize("terminated", [True, False])
-    def test_rewards_are_added_up_as_far_as_is_looked_ahead(self, terminated):
-        memory = ReplayBuffer(8, (1,))
-        ahead = Lookahead(memory, discount=0.5, decisions=3)
-        for i in range(5):
-            last = i == 4
-            following = np.full(1, i + 1)
-            ahead.add(np.full(1, i), i, 1.0, following, terminated=terminated and last, last=last)
-        assert memory.arrays["actions"][:5].tolist() == [0, 1, 2, 3, 4]
-        assert memory.arrays["rewards"][:5].tolist() == [1.75, 1.75, 1.75, 1.5, 1.0]
-        assert memory.arrays["next"][:5, 0].tolist() == [3, 4, 5, 5, 5]
-        left = [0.0] * 3 if terminated else [0.125, 0.25, 0.5]
-        assert memory.arrays["discounts"][:5].tolist() == [0.125, 0.125, *left]
+    from pushplan.training.policies.sb3_training import Sb3Learner
+
+    learner = Sb3Learner(tiny("sam", **changes), "cpu", False, folder)
+    learner.model.set_logger(configure(str(folder), []))
+    return learner
+
+
+def remember(model, seen: np.ndarray, action: int, reward: float) -> None:
+    """A decision after which the task is over, in both environments."""
+    both = np.stack([seen, seen])
+    model.replay_buffer.add(
+        both, both, np.full(2, action), np.full(2, reward), np.ones(2), [{}, {}]
+    )
 
 
 @pytest.mark.learn
 class TestSamLearner:
-    def test_a_target_that_follows_is_the_average_and_the_policy(self):
+    def test_a_target_that_follows_is_the_average_and_the_policy(self, tmp_path):
         import torch
 
-        from pushplan.training.policies.sam import SamLearner
-
         options = {"batch": 4, "buffer": 8, "widths": [4, 8], "blocks": 1, "follow": 0.25}
-        learner = SamLearner(tiny("sam", options=options), "cpu")
-        assert learner.policy is learner.target
-        before = [p.clone() for p in learner.target.parameters()]
-        learner.memory.add(np.zeros((4, 16, 16), np.uint8), 3, 1.0, np.zeros((4, 16, 16)), 0.0)
-        learner.update(np.random.default_rng(0), 0.01)
-        now = zip(before, learner.target.parameters(), learner.network.parameters(), strict=True)
+        learner = sam_learner(tmp_path, options=options)
+        policy = learner.policy
+        assert policy.acting is policy.q_net_target
+        before = [p.clone() for p in policy.q_net_target.parameters()]
+        remember(learner.model, np.zeros((4, 16, 16), np.uint8), 3, 1.0)
+        learner.model.train(1, 4)
+        now = zip(before, policy.q_net_target.parameters(), policy.q_net.parameters(), strict=True)
         for old, slow, fast in now:
             assert torch.allclose(slow, 0.75 * old + 0.25 * fast, atol=1e-6)
 
-    def test_a_map_that_is_shrunk_has_a_value_for_each_pixel(self):
+    def test_a_map_that_is_shrunk_has_a_value_for_each_pixel(self, tmp_path):
         import torch
 
         from pushplan.training.policies.networks import SpatialActionNetwork
-        from pushplan.training.policies.sam import SamLearner
 
         network = SpatialActionNetwork(4, (4, 8), 1, shrink=2)
         assert network(torch.zeros(3, 4, 32, 48)).shape == (3, 32, 48)
         with pytest.raises(InvalidInputError, match="divisible by 8"):
-            SamLearner(
-                tiny("sam", options={"shrink": 2}, observation={**MAP, "pixels": [20, 20]}), "cpu"
-            )
+            sam_learner(tmp_path, options={"shrink": 2}, observation={**MAP, "pixels": [20, 20]})
+
+    def test_rewards_are_added_up_to_the_end_of_a_chunk(self, tmp_path):
+        learner = sam_learner(tmp_path, limit=50)
+        learner.learn(range(6), 1)
+        buffer = learner.buffer
+        last = buffer.pos - 1
+        assert not buffer.dones[last].any()
+        learner.learn(range(6, 12), 2)  # begins with other episodes
+        assert buffer.timeouts[last].all()
+        buffer.rewards[:] = 1.0
+        drawn = buffer._get_samples(np.full(8, last))
+        assert drawn.rewards.unique().tolist() == [1.0]
+        assert drawn.discounts.unique().tolist() == [np.float32(0.85)]
+        drawn = buffer._get_samples(np.full(8, last - 1))
+        assert drawn.rewards.unique().tolist() == [np.float32(1.85)]
+
+    def test_random_pixels_are_at_objects(self, tmp_path):
+        from pushplan.observation.channels import MOVABLE
+
+        model = sam_learner(tmp_path, options={**TINY["sam"], "at_objects": 1.0}).model
+        seen = np.zeros((2, 4, 16, 16), np.uint8)
+        seen[:, 0, 9, 1] = MOVABLE
+        model._last_obs = seen
+        pixels = [model._sample_action(model.learning_starts, n_envs=2)[0] for _ in range(50)]
+        rows, cols = np.divmod(np.concatenate(pixels), 16)
+        assert set(rows.tolist()) == set(range(7, 12))
+        assert set(cols.tolist()) == set(range(4))
 
     @pytest.mark.slow
     def test_it_starts_with_the_weights_of_an_exported_network(self, tmp_path, data):
         import torch
 
-        from pushplan.training.policies.sam import SamLearner
-
         first = trained(tiny("sam"), tmp_path / "first", data)
         never = {"explore": 0.0, "explore_end": 0.0}
         options = {**TINY["sam"], "start": str(first.with_suffix("")), **never}
         config = tiny("sam", seed=1, options=options)
-        learner = SamLearner(config, "cpu")
+        learner = sam_learner(tmp_path / "by hand", seed=1, options=options)
         learner.begin_with(options["start"])
+        networks = (learner.policy.q_net, learner.policy.q_net_target)
         seen = np.random.default_rng(0).integers(0, 255, (4, 16, 16)).astype(np.uint8)
         with torch.no_grad():
-            values = learner.network(torch.from_numpy(seen[None]))[0].numpy()
+            values = networks[0](torch.from_numpy(seen[None]))[0].numpy()
         np.testing.assert_allclose(values, OnnxPolicy(first).decide(seen), atol=1e-5)
-        for network in (learner.target, learner.policy):
-            assert all(map(torch.equal, network.parameters(), learner.network.parameters()))
-        # it acts by them from the first decision on
-        rng = np.random.default_rng(0)
-        assert all(learner.explore(seen, rng, 0.5) == learner.best(seen) for _ in range(20))
+        assert all(map(torch.equal, *(network.parameters() for network in networks)))
+        model = learner.model  # it acts by them before it has learned
+        model.num_timesteps = 1
+        model._last_obs = np.stack([seen, seen])
+        for _ in range(20):
+            pixels, _ = model._sample_action(model.learning_starts, n_envs=2)
+            assert pixels.tolist() == [int(values.argmax())] * 2
         assert trained(config, tmp_path / "second", data, until=lambda done: done == 1) is None
         first.unlink()  # a training that is resumed needs it no more
         assert trained(config, tmp_path / "second", data, resume=True) is not None
@@ -544,26 +556,23 @@ class TestSamLearner:
         with pytest.raises(InvalidInputError, match="not finite"):
             trained(tiny("sam", options=options), tmp_path / "run", data)
 
-    def test_it_learns_which_pixel_pays(self):
-        from pushplan.training.policies.sam import SamLearner
-
-        options = {"rate": 0.01, "batch": 16, "buffer": 128, "widths": [8, 8], "blocks": 1}
-        config = tiny("sam", options={**options, "discount": 0.0, "target_every": 20})
-        learner = SamLearner(config, "cpu")
+    def test_it_learns_which_pixel_pays(self, tmp_path):
+        options = {"rate": 0.01, "batch": 16, "buffer": 256, "widths": [8, 8], "blocks": 1}
+        options |= {"discount": 0.0, "target_every": 20}
+        learner = sam_learner(tmp_path, options=options)
         rng = np.random.default_rng(0)
         for _ in range(128):  # the pixel that is lit pays
             seen = np.zeros((4, 16, 16), np.uint8)
             lit = int(rng.integers(256))
             seen[0].flat[lit] = 255
             action = lit if rng.random() < 0.5 else int(rng.integers(256))
-            learner.memory.add(seen, action, float(action == lit), seen, 0.0)
-        for _ in range(150):
-            learner.update(rng, 0.01)
+            remember(learner.model, seen, action, float(action == lit))
+        learner.model.train(150, 16)
         near = 0
         for lit in range(0, 256, 16):
             seen = np.zeros((4, 16, 16), np.uint8)
             seen[0].flat[lit + 5] = 255
-            row, col = divmod(learner.best(seen), 16)
+            row, col = divmod(int(learner.decide(seen)), 16)
             near += abs(row - lit // 16) <= 1 and abs(col - 5) <= 1
         assert near >= 12
 

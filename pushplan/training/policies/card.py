@@ -19,7 +19,7 @@ ScoreRow = Mapping[str, Any]
 _WORDS = {
     "ppo": "PPO (Stable-Baselines3)",
     "sac": "SAC (Stable-Baselines3)",
-    "sam": "Spatial action maps, double deep Q-learning",
+    "sam": "Spatial action maps, double deep Q-learning (Stable-Baselines3)",
     "bc": "Behaviour cloning",
     "flow": "Flow matching of chunks of a planner's actions",
 }

@@ -106,6 +106,9 @@ class SpatialActionNetwork(nn.Module):
             interpolated between.
     """
 
+    set_training_mode = nn.Module.train
+    """As Stable-Baselines3 calls it."""
+
     def __init__(
         self,
         channels: int,

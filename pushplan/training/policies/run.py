@@ -223,8 +223,13 @@ def train(run: TrainingRun, learner: Learner, env: TrainingEnv, until: Until | N
     config = run.config
     state = run.load()
     if state is not None:
-        learner.policy.load_state_dict(state["weights"])
-        learner.restore(state)
+        try:
+            learner.policy.load_state_dict(state["weights"])
+            learner.restore(state)
+        except (KeyError, RuntimeError, ValueError) as error:
+            raise InvalidInputError(
+                f"{run.path(CHECKPOINT)} is of another version: train anew in another folder"
+            ) from error
     began = time.perf_counter() - run.seconds
     for chunk in range(run.done, run.chunks):
         if until is not None and until(chunk):

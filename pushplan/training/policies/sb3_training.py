@@ -1,7 +1,8 @@
-"""PPO and SAC with Stable-Baselines3. Import it only where the library is there."""
+"""PPO, SAC and SAM with Stable-Baselines3. Import it only where the library is there."""
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +15,11 @@ from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv
 
 from pushplan.training.policies.config import TrainingConfig
 from pushplan.training.policies.environment import TrainingEnv
+from pushplan.training.policies.initial import load_weights
 from pushplan.training.policies.networks import SmallEncoder
-from pushplan.training.policies.options import PpoOptions
+from pushplan.training.policies.options import PpoOptions, SamOptions
 from pushplan.training.policies.run import Learned, chunk_seed
+from pushplan.training.policies.sam import SpatialActionDqn, SpatialActionPolicy
 
 _LEAST_RATE = 0.1
 _ARGUMENTS = {
@@ -33,6 +36,7 @@ _ARGUMENTS = {
     "every": "train_freq",
     "updates": "gradient_steps",
     "follow": "tau",
+    "lookahead": "n_steps",
 }
 """Names of our options in the library, of those that the algorithm has."""
 _BUFFER = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
@@ -63,7 +67,7 @@ class Sb3Learner:
 
     progress = (
         "%(steps)d of %(total)d decisions, %(seconds).0f s: success %(train_success).2f in "
-        "training, %(valid_success).2f in validation"
+        "training, %(valid_success).2f in validation, fraction %(valid_share).2f"
     )
 
     def __init__(self, config: TrainingConfig, device: str, processes: bool, logs: Path) -> None:
@@ -78,23 +82,35 @@ class Sb3Learner:
         )
         is_image = len(env.observation_space.shape) == 3
         options = config.options
+        arguments = {
+            theirs: getattr(options, ours)
+            for ours, theirs in _ARGUMENTS.items()
+            if hasattr(options, ours)
+        }
         network: dict[str, Any] = {"net_arch": list(options.widths), "activation_fn": torch.nn.ReLU}
-        if is_image:
-            network["features_extractor_class"] = ImageFeatures
+        policy: Any = "CnnPolicy" if is_image else "MlpPolicy"
+        if isinstance(options, SamOptions):
+            algorithm: Any = partial(SpatialActionDqn, config)
+            policy = SpatialActionPolicy
+            layers = {name: getattr(options, name) for name in ("widths", "blocks", "shrink")}
+            network = {"net_arch": layers, "averaged": options.follow > 0.0}
+            arguments["max_grad_norm"] = arguments.pop("clip_range")
+            # ``every`` steps of all environments belong to a gradient step for each of them
+            arguments["gradient_steps"] = config.envs
+        else:
+            algorithm = getattr(stable_baselines3, config.algorithm.upper())
+            if is_image:
+                network["features_extractor_class"] = ImageFeatures
         if isinstance(options, PpoOptions):
             network["log_std_init"] = options.deviation
-        self.model: Any = getattr(stable_baselines3, config.algorithm.upper())(
-            policy="CnnPolicy" if is_image else "MlpPolicy",
+        self.model: Any = algorithm(
+            policy=policy,
             env=env,
             seed=chunk_seed(config.seed, 0),
             device=device,
             tensorboard_log=str(logs),
             policy_kwargs=network,
-            **{
-                theirs: getattr(options, ours)
-                for ours, theirs in _ARGUMENTS.items()
-                if hasattr(options, ours)
-            },
+            **arguments,
         )
 
     @property
@@ -102,13 +118,29 @@ class Sb3Learner:
         """The policy of the model."""
         return self.model.policy
 
+    @property
+    def buffer(self) -> Any:
+        """The replay buffer, None with PPO."""
+        return getattr(self.model, "replay_buffer", None)
+
+    def begin_with(self, source: str) -> None:
+        """Take the weights of a network that was exported before."""
+        policy = self.policy
+        load_weights(policy.q_net, source)
+        policy.q_net_target.load_state_dict(policy.q_net.state_dict())
+
     def learn(self, steps: range, seed: int) -> Learned:
         """Learn with fresh episodes and generators, and the rate of this part of the training."""
         model, config = self.model, self.config
         model.set_random_seed(seed)  # also of the environments, at their next reset
         model.env.seed(seed)
         model._last_obs = None
-        if isinstance(config.options, PpoOptions):
+        if self.buffer is not None:  # returns of several steps end where the last episodes did
+            last = self.buffer.pos - 1
+            self.buffer.timeouts[last] = np.maximum(
+                self.buffer.timeouts[last], 1.0 - self.buffer.dones[last]
+            )
+        if isinstance(config.options, PpoOptions | SamOptions):
             # rates fall chunk by chunk: the library's own schedule would begin anew in each
             chunks = -(-config.steps // config.chunk)
             fraction = steps.start // config.chunk / chunks
@@ -121,7 +153,7 @@ class Sb3Learner:
             return True
 
         model.learn(len(steps), callback=watch, reset_num_timesteps=False, tb_log_name="tb")
-        loss = "train/loss" if config.algorithm == "ppo" else "train/critic_loss"
+        loss = "train/critic_loss" if config.algorithm == "sac" else "train/loss"
         return Learned(
             model.num_timesteps,
             float(model.logger.name_to_value.get(loss, np.nan)),
@@ -144,12 +176,12 @@ class Sb3Learner:
             "updates": int(model._n_updates),
         }
         if self.config.algorithm == "sac":
-            buffer = model.replay_buffer
-            used = buffer.buffer_size if buffer.full else buffer.pos
             state["temperature"] = model.log_ent_coef.detach().cpu()
-            state["position"], state["full"] = int(buffer.pos), bool(buffer.full)
+        if self.buffer is not None:
+            state["position"], state["full"] = int(self.buffer.pos), bool(self.buffer.full)
             for name in _BUFFER:
-                state[name] = torch.from_numpy(getattr(buffer, name)[:used])
+                used = getattr(self.buffer, name)[: self.buffer.size()]
+                state[name] = torch.from_numpy(used)
         return state
 
     def restore(self, state: Any) -> None:
@@ -160,11 +192,11 @@ class Sb3Learner:
         model._n_updates = int(state["updates"])
         if self.config.algorithm == "sac":
             model.log_ent_coef.data.copy_(state["temperature"])
-            buffer = model.replay_buffer
-            buffer.pos, buffer.full = int(state["position"]), bool(state["full"])
+        if self.buffer is not None:
+            self.buffer.pos, self.buffer.full = int(state["position"]), bool(state["full"])
             for name in _BUFFER:
                 values = state[name].numpy()
-                getattr(buffer, name)[: len(values)] = values
+                getattr(self.buffer, name)[: len(values)] = values
 
     def close(self) -> None:
         """Close the environments."""

@@ -17,7 +17,7 @@ from pushplan.learned.specification import Specification
 from pushplan.training.libraries import chosen_device, hardware, parameter_count
 from pushplan.training.policies.config import IMITATING, TrainingConfig
 from pushplan.training.policies.environment import TrainingEnv
-from pushplan.training.policies.options import PpoOptions, SacOptions, SamOptions
+from pushplan.training.policies.options import SamOptions
 from pushplan.training.policies.run import (
     CHECKPOINT,
     CURVE,
@@ -50,7 +50,7 @@ def train_policy(
         folder: of the training; also holds its checkpoint.
         resume: go on with what is in the folder.
         device: ``"auto"``, ``"cpu"`` or ``"cuda"``.
-        processes: with PPO and SAC, a process for each environment.
+        processes: unless it imitates, a process for each environment.
         threads: of PyTorch.
         data: with ``bc`` and ``flow``, the folders of data sets, or one of them.
         command: what the model card says that the training was started with.
@@ -86,7 +86,9 @@ def train_policy(
         raise
     learner.close()
     network = learner.policy
-    if isinstance(config.options, PpoOptions | SacOptions):
+    if isinstance(config.options, SamOptions):
+        network = network.acting
+    elif not imitates:
         network = _saved_actor(run, learner.model, env)
     _draw(run)
     path = None
@@ -104,17 +106,14 @@ def _learner(
         from pushplan.training.policies.cloning import Imitator
 
         return Imitator(config, data, env, device)
-    if isinstance(config.options, SamOptions):
-        from pushplan.training.policies.sam import SamLearner
-
-        learner = SamLearner(config, device)
-        if config.options.start and not run.path(CHECKPOINT).is_file():
-            learner.begin_with(config.options.start)
-        return learner
     need("stable_baselines3")
     from pushplan.training.policies.sb3_training import Sb3Learner
 
-    return Sb3Learner(config, device, processes, run.folder)
+    learner = Sb3Learner(config, device, processes, run.folder)
+    start = getattr(config.options, "start", "")
+    if start and not run.path(CHECKPOINT).is_file():
+        learner.begin_with(start)
+    return learner
 
 
 def _saved_actor(run: TrainingRun, model: Any, env: TrainingEnv) -> Any:
@@ -186,7 +185,7 @@ def _finish(
 
     libraries = [
         "torch",
-        *(["stable_baselines3"] if isinstance(run.config.options, PpoOptions | SacOptions) else []),
+        *([] if run.config.algorithm in IMITATING else ["stable_baselines3"]),
     ]
     best = max(run.curve, key=lambda point: (point.rank, point.steps))
     path = export(network, _specification(env, best_steps=best.steps), run.path(POLICY))
