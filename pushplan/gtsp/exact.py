@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from pushplan.compiled import copy_into, kernel
-from pushplan.gtsp.problem import Problem
+from pushplan.gtsp.problem import Padded, Problem
 from pushplan.world.checks import FloatArray, IntArray
 
 
@@ -59,40 +59,6 @@ def _relax(values: FloatArray, block: FloatArray, size: int, out: FloatArray, wi
         i += 1
 
 
-@kernel
-def read_path(
-    table: FloatArray,  # (2^m, m, K)
-    blocks: FloatArray,  # (m, K, m, K)
-    sizes: IntArray,  # (m,)
-    last: FloatArray,  # (m, K) cost from each node back to the root
-    path: IntArray,  # (m,) filled with ``cluster * K + node``
-) -> float:
-    """The cost of the cheapest closed tour in a filled table; ``path`` in visiting order."""
-    count, width = last.shape
-    subset = (1 << count) - 1
-    best, at = np.inf, -1
-    for c in range(count):
-        for j in range(sizes[c]):
-            x = table[subset, c, j] + last[c, j]
-            if x < best:
-                best, at = x, c * width + j
-    if at < 0:
-        return best
-    for i in range(count - 1, -1, -1):
-        path[i] = at
-        d, j = at // width, at % width
-        value = table[subset, d, j]
-        subset ^= 1 << d
-        at = -1
-        for c in range(count):
-            if not (subset >> c) & 1:
-                continue
-            for k in range(sizes[c]):
-                if at < 0 and table[subset, c, k] + blocks[c, k, d, j] == value:
-                    at = c * width + k
-    return best
-
-
 ARCS_PER_SECOND = 1.5e9
 """How many arcs the kernel looks at, on a slow machine."""
 
@@ -121,34 +87,38 @@ def solve_exactly(
         Whether it got to its end, and the nodes in visiting order; None if no tour is finite or it
         was stopped.
     """
-    root = problem.root
-    others = [c for c in range(problem.count) if c != root]
-    free, width = len(others), problem.width
-    spans = [slice(*problem.offsets[c : c + 2]) for c in others]
-    sizes = np.array([span.stop - span.start for span in spans], dtype=np.int64)
-    blocks = np.full((free, width, free, width), np.inf)
-    for c, rows in enumerate(spans):
-        for d, columns in enumerate(spans):
-            if c != d:
-                blocks[c, : sizes[c], d, : sizes[d]] = problem.costs[rows, columns]
-    first, last = np.full((free, width), np.inf), np.full((free, width), np.inf)
-    table = np.empty((1 << free, free, width))
-    path = np.empty(free, dtype=np.int64)
-    per_subset = max(expected_seconds(problem) / 2.0**free, 1e-9)
-    step = max(1, int(chunk_s / per_subset))
+    others = problem.members
+    roots = others.pop(problem.root)
+    padded = Padded.gather(problem.costs, others)
+    subsets = 1 << len(others)
+    table = np.empty((subsets, *padded.names.shape))
+    step = max(1, int(chunk_s / max(expected_seconds(problem) / subsets, 1e-9)))
     best, nodes = np.inf, None
-    for node in range(*problem.offsets[root : root + 2]):
-        for c, span in enumerate(spans):
-            first[c, : sizes[c]] = problem.costs[node, span]
-            last[c, : sizes[c]] = problem.costs[span, node]
-        for low in range(1, 1 << free, step):
+    for root in roots:
+        first = padded.pick(problem.costs[root])
+        for low in range(1, subsets, step):
             if stopped():
                 return False, None
-            high = min(low + step, 1 << free)
-            fill_subsets(low, high, table, blocks, sizes, first)
-        cost = read_path(table, blocks, sizes, last, path)
-        if cost < best:
-            best = cost
-            starts = problem.offsets[np.array(others)[path // width]]
-            nodes = np.concatenate(([node], starts + path % width))
+            high = min(low + step, subsets)
+            fill_subsets(low, high, table, padded.costs, padded.sizes, first)
+        ends = table[-1] + padded.pick(problem.costs[:, root])
+        if ends.min() < best:
+            best = ends.min()
+            nodes = np.array([root, *_path_to(int(ends.argmin()), table, padded)])
     return True, nodes
+
+
+def _path_to(end: int, table: FloatArray, padded: Padded) -> list[int]:
+    """The nodes of the cheapest path to a node of a filled table, ``cluster * K + node``."""
+    left = list(range(len(padded.sizes)))
+    subset = len(table) - 1
+    path: list[int] = []
+    while left:
+        c, i = divmod(end, table.shape[2])
+        path.append(padded.names[left[c], i])
+        d = left.pop(c)
+        value = table[subset, d, i]
+        subset ^= 1 << d
+        before = table[subset, left] + padded.costs[left, :, d, i]  # (clusters that are left, K)
+        end = int((before == value).argmax()) if left else -1
+    return path[::-1]

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pushplan.world.checks import FloatArray, IntArray
+from pushplan.world.checks import IntArray
 
 NEAREST = 5
 """How many of the nearest clusters say how promising a node is."""
@@ -25,31 +25,20 @@ def promising(
     Returns:
         The nodes that are kept.
     """
-    count = len(members)
-    each = max(1, most // count)
-    into, out = np.full((NEAREST, len(costs)), np.inf), np.full((NEAREST, len(costs)), np.inf)
-    for nodes in members:
-        if stopped():
-            break
-        _merge(into, costs[nodes].min(axis=0), nodes)
-        _merge(out, costs[:, nodes].min(axis=1), nodes)
-    score = _total(into) + _total(out)
+    score = np.zeros(len(costs))
+    for arcs in (costs, costs.T):
+        least = np.full((len(members), len(costs)), np.inf)  # cheapest arc with each cluster
+        for cluster, nodes in enumerate(members):
+            if stopped():
+                break
+            least[cluster] = arcs[nodes].min(axis=0)
+            least[cluster, nodes] = np.inf
+        some = np.arange(min(NEAREST, len(members)))
+        nearest = np.partition(least, some, axis=0)[some]
+        total = np.where(np.isfinite(nearest), nearest, 0.0).sum(axis=0)
+        score += np.where(np.isfinite(nearest[0]), total, np.inf)
+    each = max(1, most // len(members))
     return [np.sort(nodes[np.argsort(score[nodes], kind="stable")[:each]]) for nodes in members]
-
-
-def _merge(best: FloatArray, values: NDArray[np.number], own: IntArray) -> None:
-    """Keep the least values of each column in ``best``, in ascending order."""
-    new = values.astype(np.float64)
-    new[own] = np.inf
-    for row in best:
-        lower, new = np.minimum(row, new), np.maximum(row, new)
-        row[:] = lower
-
-
-def _total(best: FloatArray) -> FloatArray:
-    """Sums of what is finite, infinite where nothing is."""
-    total = np.where(np.isfinite(best), best, 0.0).sum(axis=0)
-    return np.where(np.isfinite(best[0]), total, np.inf)
 
 
 def best_choice(
@@ -61,21 +50,15 @@ def best_choice(
     Returns:
         A node of each.
     """
-    values: FloatArray = np.full((len(layers[0]), len(layers[0])), np.inf)  # (root, node)
-    np.fill_diagonal(values, 0.0)
+    values = np.where(np.eye(len(layers[0])) > 0.0, 0.0, np.inf)  # (root, node)
     picks: list[IntArray] = []
     for here, there in zip(layers, [*layers[1:], layers[0]], strict=True):
-        arcs = costs[np.ix_(here, there)].astype(np.float64)  # (here, there)
-        pick = np.empty((len(values), len(there)), dtype=np.int64)
-        following = np.empty((len(values), len(there)))
-        for root, row in enumerate(values):
-            total = row[:, None] + arcs
-            pick[root] = total.argmin(axis=0)
-            following[root] = np.take_along_axis(total, pick[root][None], 0)[0]
+        arcs = costs[np.ix_(here, there)]
+        pick = np.array([(row[:, None] + arcs).argmin(axis=0) for row in values])  # (root, there)
+        values = np.take_along_axis(values, pick, 1) + arcs[pick, np.arange(len(there))]
         picks.append(pick)
-        values = following
-    root = int(np.diag(values).argmin())
-    at, chosen = root, []
+    at = root = int(np.diag(values).argmin())
+    chosen = []
     for pick, nodes in zip(reversed(picks), reversed(layers), strict=True):
         at = int(pick[root, at])
         chosen.append(nodes[at])

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +61,11 @@ class Problem:
     def root(self) -> int:
         """The smallest cluster."""
         return int(np.argmin(np.diff(self.offsets)))
+
+    @property
+    def members(self) -> list[IntArray]:
+        """The nodes of each cluster."""
+        return np.split(np.arange(len(self.costs)), self.offsets[1:-1])
 
     @cached_property
     def cluster_of(self) -> IntArray:
@@ -164,27 +170,42 @@ def _known(values: FloatArray) -> FloatArray:
 def usable(
     costs: NDArray[np.number],  # (N, N)
     members: Sequence[IntArray],  # nodes of each cluster
-) -> tuple[list[IntArray], int | None]:
-    """Leave out nodes that no tour can enter or leave.
-
-    Returns:
-        The members that are left, and a cluster that has none left, if there is one.
-    """
-    kept = [np.asarray(nodes) for nodes in members]
-    if len(kept) < 2 or costs.dtype.kind != "f" or not np.isinf(costs.max()):
-        return kept, None
+) -> list[IntArray]:
+    """The members of each cluster without nodes that no tour can enter or leave."""
+    if costs.dtype.kind != "f" or not np.isinf(costs.max()):
+        return list(members)
     arcs = np.isfinite(costs)
-    for nodes in kept:
+    for nodes in members:
         arcs[np.ix_(nodes, nodes)] = False
     active = np.ones(len(costs), dtype=bool)
     while True:
-        good = active & arcs.any(axis=0) & arcs.any(axis=1)
-        if (good == active).all():
-            break
-        gone = active & ~good
+        gone = active & ~(arcs.any(axis=0) & arcs.any(axis=1))
+        if not gone.any():
+            return [nodes[active[nodes]] for nodes in members]
         arcs[gone] = False
         arcs[:, gone] = False
-        active = good
-    kept = [nodes[active[nodes]] for nodes in kept]
-    empty = next((index for index, nodes in enumerate(kept) if not len(nodes)), None)
-    return kept, empty
+        active &= ~gone
+
+
+class Padded(NamedTuple):
+    """Clusters as rows of K nodes, the shorter ones padded."""
+
+    names: IntArray  # (n, K) number of each node, -1 where there is none
+    sizes: IntArray  # (n,) nodes of each cluster
+    costs: FloatArray  # (n, K, n, K) from node i of c to node j of d, infinite where there is none
+
+    @staticmethod
+    def gather(costs: FloatArray, members: Sequence[IntArray]) -> Padded:
+        """Take these nodes out of (N, N) costs."""
+        sizes = np.array([len(nodes) for nodes in members], dtype=np.int64)
+        names = np.full((len(members), int(sizes.max())), -1, dtype=np.int64)
+        names[np.arange(names.shape[1]) < sizes[:, None]] = np.concatenate(members)
+        flat = names.ravel()
+        between = costs[np.ix_(flat, flat)]
+        between[flat < 0] = np.inf
+        between[:, flat < 0] = np.inf
+        return Padded(names, sizes, between.reshape(names.shape * 2))
+
+    def pick(self, values: FloatArray) -> FloatArray:
+        """(n, K) what (N,) values say of each node, infinite where there is none."""
+        return np.where(self.names < 0, np.inf, values[self.names])

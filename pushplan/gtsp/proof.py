@@ -10,92 +10,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pushplan.gtsp.gtsp_config import GtspConfig
 from pushplan.gtsp.problem import Problem
 from pushplan.gtsp.walk_kernels import PathProblem, Paths, extend_paths
 from pushplan.gtsp.walks import CHUNK_ARCS, StopFired, Walks
 from pushplan.world.checks import FloatArray, IntArray
-
-
-def cheaper_tour(
-    walks: Walks,  # filled; changed by `Walks.allow_memories`
-    most: int,  # paths of one length at most
-) -> tuple[bool, IntArray | None, int]:
-    """The cheapest tour below the limit of the walks, by paths of more and more clusters.
-
-    A path is known by its clusters and its last node. The walks bound what completes it.
-
-    Returns:
-        Whether the paths were few enough; the nodes of the tour, None if there is none; how many
-        paths there were.
-    """
-    walks.allow_memories()
-    paths, total = _first_paths(walks), 0
-    trail = [(paths.ends, paths.parents)]
-    slots = np.empty(1 << int(np.ceil(np.log2(2 * most))), dtype=np.int64)
-    for k in range(walks.count - 2, -1, -1):
-        slots[:] = -1
-        longer = _longer(walks, paths, walks.walks[k], slots, most)
-        if longer is None:
-            return False, None, total
-        paths = longer
-        total += len(paths.ends)
-        trail.append((paths.ends, paths.parents))
-    costs = paths.values + walks.last.ravel()[paths.ends]
-    if not len(costs) or not costs.min() < walks.limit:
-        return True, None, total
-    at, chosen = int(costs.argmin()), []
-    for ends, parents in reversed(trail):
-        chosen.append(walks.names.ravel()[ends[at]])
-        at = int(parents[at])
-    return True, np.array([walks.node, *chosen[::-1]], dtype=np.int64), total
-
-
-def _room_for(size: int) -> Paths:
-    """Memory for so many paths."""
-    whole = np.empty((3, size), dtype=np.int64)
-    real = np.empty((2, size))
-    return Paths(whole[0], whole[1], real[0], real[1], whole[2])
-
-
-def _only(paths: Paths, which: slice | NDArray[np.bool_]) -> Paths:
-    """A copy of some of them."""
-    return Paths._make(part[which].copy() for part in paths)
-
-
-def _first_paths(walks: Walks) -> Paths:
-    """From the root to one node."""
-    ends = np.flatnonzero(walks.names.ravel() >= 0)
-    cluster = ends // walks.width
-    paths = _room_for(len(ends))
-    paths.ends[:], paths.parents[:] = ends, 0
-    paths.sets[:] = np.int64(1) << cluster
-    paths.values[:] = walks.first.ravel()[ends]
-    paths.rests[:] = walks.prices.sum() - walks.prices[cluster]
-    hope = walks.walks[-1, :, -1].ravel()[ends]
-    return _only(paths, paths.values + hope + paths.rests < walks.limit)
-
-
-def _longer(
-    walks: Walks, paths: Paths, within: FloatArray, slots: IntArray, most: int
-) -> Paths | None:
-    """All of them with one node more; None if they are too many."""
-    problem = PathProblem(within, walks.costs, walks.known, walks.prices, walks.sizes, walks.limit)
-    new, found = _room_for(most), 0
-    step = max(1, CHUNK_ARCS // (4 * walks.count * walks.width))
-    for low in range(0, len(paths.ends), step):
-        high = min(low + step, len(paths.ends))
-        found = extend_paths(problem, paths, low, high, slots, new, found)
-        walks.look()
-        if found < 0:
-            return None
-    return _only(new, slice(found))
-
 
 MOST_CLUSTERS = 62
 """Besides the root: a path keeps its clusters in the bits of one number."""
@@ -112,35 +34,34 @@ FEW_PATHS = 4_000
 class Proof:
     """What is known of the optimum."""
 
-    bound: float = -np.inf  # no tour is cheaper, -inf if nothing is known
-    complete: bool = False  # whether the best tour that is known is proven to be optimal
+    bound: float = np.inf  # no tour is cheaper, -inf if nothing is known
+    complete: bool = True  # the best tour that is known is proven to be optimal
     nodes: IntArray | None = None  # a cheaper tour than the given one, if one was found
-    detail: dict[str, float] = field(default_factory=dict)  # further numbers, by name
+    paths: int = 0  # looked at
 
 
 def prove(
     problem: Problem,  # with at least 4 clusters
     cost: float,  # of the best tour that is known; may be infinite
     stopped: Callable[[], bool],  # asked every few milliseconds
-    config: GtspConfig,  # its ``proof_states``
+    most: int,  # paths of one length at most
 ) -> Proof:
     """A lower bound, and a proof where the paths are few enough."""
-    result = Proof(np.inf, True, None, {"paths": 0.0})
-    others = np.delete(np.arange(problem.count), problem.root)
-    members = [np.arange(*problem.offsets[c : c + 2]) for c in others]
-    near = problem.nearest(problem.count)[0][others]
-    lists = near[near != problem.root].reshape(len(others), -1)  # numbers of all clusters
+    result = Proof()
+    members = problem.members
+    roots = members.pop(problem.root)
+    near = np.delete(problem.nearest(problem.count)[0], problem.root, axis=0)
+    lists = near[near != problem.root].reshape(len(members), -1)  # numbers of all clusters
     lists -= lists > problem.root  # numbers of the others
     costs = worth_using(problem, cost)
     limit = cost
-    for node in range(*problem.offsets[problem.root : problem.root + 2]):
-        walks = Walks(costs, node, members, lists, limit, stopped)
-        done, nodes, paths = False, None, 0
+    for root in roots:
+        walks = Walks(costs, root, members, lists, limit, stopped)
         try:
-            done, nodes, paths = _settle(walks, config)
+            done, nodes = _settle(walks, most)
         except StopFired:
-            pass
-        result.detail["paths"] += paths
+            done, nodes = False, None
+        result.paths += walks.paths
         if nodes is not None:
             result.nodes, limit = nodes, problem.path_cost(nodes)
         result.bound = min(result.bound, min(walks.limit, limit) if done else walks.bound)
@@ -158,31 +79,78 @@ def worth_using(problem: Problem, cost: float) -> FloatArray:
     stands for a forbidden arc from spoiling the margins of rounding.
     """
     result = problem.outer
-    for turned in (False, True):
-        arcs = result.T if turned else result
-        least = np.minimum.reduceat(arcs.min(axis=0), problem.offsets[:-1])
+    for _ in ("into", "out of"):
+        least = np.minimum.reduceat(result.min(axis=0), problem.offsets[:-1])
         spare = cost - math.fsum(least) + 1e-9 * (abs(cost) + math.fsum(np.abs(least)))
-        arcs = np.where(arcs - least[problem.cluster_of] > spare, np.inf, arcs)
-        result = arcs.T if turned else arcs
+        result = np.where(result - least[problem.cluster_of] > spare, np.inf, result).T
     return result
 
 
-def _settle(walks: Walks, config: GtspConfig) -> tuple[bool, IntArray | None, int]:
-    """Whether no tour below the limit is missed, the nodes of one if there is one, and paths."""
-    total = 0
+def _settle(walks: Walks, most: int) -> tuple[bool, IntArray | None]:
+    """True if no tour below the limit is missed, and the nodes of one if there is one."""
     for bits, steps in STAGES:
         bits = min(bits, walks.count - 1)
-        numbers, arcs = walks.size_with(bits)
-        if numbers > LARGEST_TABLE or arcs > MOST_ARCS:
+        numbers = walks.count**2 * 2.0**bits * walks.width
+        if numbers > LARGEST_TABLE or numbers * walks.count * walks.width > MOST_ARCS:
             break
         walks.remember(bits)
         walks.ascend(steps)
         if walks.bound > walks.limit or not walks.thin():
-            return True, None, total
+            return True, None
         if bits and walks.count <= MOST_CLUSTERS:
-            most = min(config.proof_states, FEW_PATHS << bits)
-            done, nodes, paths = cheaper_tour(walks, most)
-            total += paths
+            done, nodes = cheaper_tour(walks, min(most, FEW_PATHS << bits))
             if done:
-                return True, nodes, total
-    return False, None, total
+                return True, nodes
+    return False, None
+
+
+def cheaper_tour(
+    walks: Walks,  # filled; changed by `Walks.allow_memories`
+    most: int,  # paths of one length at most
+) -> tuple[bool, IntArray | None]:
+    """The cheapest tour below the limit of the walks, by paths of more and more clusters.
+
+    A path is known by its clusters and its last node. The walks bound what completes it.
+
+    Returns:
+        True if the paths were few enough; the nodes of the tour, None if there is none.
+    """
+    walks.allow_memories()
+    names, sizes, costs = walks.nodes
+    ends = np.flatnonzero(names >= 0)
+    clusters = ends // walks.width
+    first = Paths(
+        np.int64(1) << clusters,
+        ends,
+        walks.first.ravel()[ends],
+        walks.prices.sum() - walks.prices[clusters],
+        np.zeros(len(ends), dtype=np.int64),
+    )
+    hope = walks.walks[-1, :, -1].ravel()[ends]
+    worth = first.values + hope + first.rests < walks.limit
+    paths = Paths._make(part[worth] for part in first)
+    trail = [(paths.ends, paths.parents)]
+    slots = np.empty(1 << int(np.ceil(np.log2(2 * most))), dtype=np.int64)
+    step = max(1, CHUNK_ARCS // (4 * walks.count * walks.width))
+    for within in walks.walks[-2::-1]:
+        problem = PathProblem(within, costs, walks.known, walks.prices, sizes, walks.limit)
+        longer = Paths._make(np.empty(most, dtype=part.dtype) for part in paths)
+        found = 0
+        slots[:] = -1
+        for low in range(0, len(paths.ends), step):
+            high = min(low + step, len(paths.ends))
+            found = extend_paths(problem, paths, low, high, slots, longer, found)
+            walks.look()
+            if found < 0:
+                return False, None
+        paths = Paths._make(part[:found] for part in longer)
+        trail.append((paths.ends, paths.parents))
+        walks.paths += found
+    totals = paths.values + walks.last.ravel()[paths.ends]
+    if not totals.min(initial=np.inf) < walks.limit:
+        return True, None
+    at, chosen = int(totals.argmin()), [walks.node]
+    for ends, parents in reversed(trail):
+        chosen.insert(1, names.ravel()[ends[at]])
+        at = int(parents[at])
+    return True, np.array(chosen, dtype=np.int64)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -81,145 +81,121 @@ def solve_gtsp(
     return replace(tour, nodes=tuple(names[node] for node in tour.nodes)) if names else tour
 
 
+@dataclass
 class _SolverCall:
     """One call of the solver."""
 
-    def __init__(
-        self,
-        costs: NDArray[np.number],
-        members: tuple[IntArray, ...],
-        seed: IntArray,
-        budget: Budget,
-        stop: Stop | None,
-        config: GtspConfig,
-    ) -> None:
-        self.costs, self.members, self.seed = costs, members, seed
-        self.budget, self.stop, self.config = budget, stop, config
-        self.method, self.detail = "none", dict[str, float]()
+    costs: NDArray[np.number]
+    members: tuple[IntArray, ...]
+    seed: IntArray
+    budget: Budget
+    stop: Stop | None
+    config: GtspConfig
+    method: str = "none"
+    detail: dict[str, float] = field(default_factory=dict)
 
     def solve(self) -> Tour:
         """Choose a method and run it."""
+        config, budget = self.config, self.budget
         if len(self.members) == 1:
-            self.budget.note(0.0)
-            return self._tour(self.members[0][:1], 0.0, proven=True)
-        if self.budget.stopped():
-            return self._nothing()
-        kept, empty = usable(self.costs, self.members)
-        if empty is not None:
-            return self._failed(TourStatus.INFEASIBLE, math.inf)
-        total = sum(len(nodes) for nodes in kept)
-        limit = self.config.search_nodes
-        if self.budget.seconds < math.inf:
-            limit = min(limit, int(NODES_PER_ROOT_SECOND * math.sqrt(self.budget.seconds)))
-        if total > max(limit, len(kept)) and len(kept) > 2 and self.config.method != "exact":
-            return self._large(kept, limit)
+            return self._tour(self.members[0][:1], proven=True)
+        if budget.stopped():
+            return self._failed()
+        kept = usable(self.costs, self.members)
+        if not all(len(nodes) for nodes in kept):
+            return self._failed(infeasible=True)
+        limit = config.search_nodes
+        if budget.seconds < math.inf:
+            limit = min(limit, int(NODES_PER_ROOT_SECOND * math.sqrt(budget.seconds)))
+        large = sum(len(nodes) for nodes in kept) > max(limit, len(kept)) and len(kept) > 2
+        if large and config.method != "exact":
+            few = promising(
+                self.costs, kept, limit, lambda: budget.gone() > 0.3 or budget.stopped()
+            )
+            problem = Problem.build(self.costs, few)
+            self.detail["nodes"] = float(len(problem.names))
+            return self._search(problem, kept)
         problem = Problem.build(self.costs, kept).reduced()
         if self._goes_exact(problem):
-            found = self._exact(problem)
-            if found is not None:
-                return found
+            alone = config.method == "exact" or problem.count <= 3
+            self.method, until = "exact", EXACT_FRACTION * budget.seconds
+            complete, nodes = solve_exactly(
+                problem,
+                lambda: budget.stopped() or (budget.elapsed > until and config.method != "exact"),
+                config.chunk_s,
+            )
+            if nodes is not None:
+                return self._tour(problem.names[nodes], proven=True)
+            if complete or alone:
+                return self._failed(infeasible=complete)
         return self._search(problem)
 
     def _goes_exact(self, problem: Problem) -> bool:
-        config, need = self.config, table_mb(problem)
-        if config.method == "exact":
-            if need > config.memory_mb:
-                raise InvalidInputError(
-                    f"method 'exact' needs a table of {need:.3g} MB for {problem.count} clusters "
-                    f"of up to {problem.width} nodes, but memory_mb is {config.memory_mb:g}: "
-                    f"raise it, or use method 'search'"
-                )
-            return True
-        if problem.count <= 3:
+        config, budget, need = self.config, self.budget, table_mb(problem)
+        if config.method == "exact" and need > config.memory_mb:
+            raise InvalidInputError(
+                f"method 'exact' needs a table of {need:.3g} MB for {problem.count} clusters "
+                f"of up to {problem.width} nodes, but memory_mb is {config.memory_mb:g}: "
+                f"raise it, or use method 'search'"
+            )
+        if config.method == "exact" or problem.count <= 3:
             return True
         fits = need <= config.memory_mb and problem.count - 1 <= config.exact_clusters
-        timed = self.budget.seconds < math.inf
-        left = EXACT_FRACTION * self.budget.seconds - self.budget.elapsed if timed else UNTIMED_S
+        timed = budget.seconds < math.inf
+        left = EXACT_FRACTION * budget.seconds - budget.elapsed if timed else UNTIMED_S
         return config.method == "auto" and fits and expected_seconds(problem) < left
 
-    def _exact(self, problem: Problem) -> Tour | None:
-        """The optimum; None where a search has to go on."""
-        self.method, budget = "exact", self.budget
-        alone = self.config.method == "exact"
-        until = math.inf if alone else EXACT_FRACTION * budget.seconds
-        complete, nodes = solve_exactly(
-            problem, lambda: budget.elapsed > until or budget.stopped(), self.config.chunk_s
-        )
-        if not complete:
-            return self._nothing() if alone or problem.count <= 3 else None
-        if nodes is None:
-            return self._failed(TourStatus.INFEASIBLE, math.inf)
-        chosen = problem.names[nodes]
-        cost = tour_cost(self.costs, chosen)
-        self.budget.note(cost)
-        return self._tour(chosen, cost, proven=True)
-
-    def _search(self, problem: Problem) -> Tour:
+    def _search(self, problem: Problem, everything: list[IntArray] | None = None) -> Tour:
+        """Search, then choose among all nodes of each cluster for the order that was found."""
         self.method = "search"
         config, budget = self.config, self.budget
-        fraction = 1.0 - config.proof_fraction if config.lower_bound else 1.0
-        if budget.seconds == math.inf:
-            fraction = 1.0
-        nodes = search(problem, config, self.seed, budget, fraction)
-        cost = problem.path_cost(nodes)
-        bound = problem.floor
+        prove_it = config.lower_bound and everything is None
+        timed = prove_it and budget.seconds < math.inf
+        order = search(
+            problem, config, self.seed, budget, 1.0 - config.proof_fraction if timed else 1.0
+        )
+        if everything is not None:
+            nodes = best_choice(self.costs, [everything[c] for c in order])
+            return self._tour(nodes)
+        members = problem.members
+        nodes = best_choice(problem.costs, [members[c] for c in order])
+        cost, bound = problem.path_cost(nodes), problem.floor
         late = budget.elapsed + PROOF_SETUP_S * len(problem.names) ** 2 > budget.seconds
-        if not config.lower_bound or late or budget.check(0, cost):
-            return self._tour(problem.names[nodes], cost, bound=bound)
-        proof = prove(problem, cost, lambda: budget.check(0, budget.cost), config)
-        self.detail.update(proof.detail)
-        if proof.nodes is not None:
-            nodes, cost = proof.nodes, problem.path_cost(proof.nodes)
-            budget.note(cost)
-        if proof.complete and cost == math.inf:
-            return self._failed(TourStatus.INFEASIBLE, math.inf)
-        chosen = problem.names[nodes]
-        return self._tour(chosen, cost, bound=max(bound, proof.bound), proven=proof.complete)
-
-    def _large(self, kept: list[IntArray], limit: int) -> Tour:
-        """Search on promising nodes, then choose among all nodes for the order that was found."""
-        self.method = "search"
-        budget = self.budget
-        few = promising(self.costs, kept, limit, lambda: budget.gone() > 0.3 or budget.stopped())
-        problem = Problem.build(self.costs, few)
-        self.detail["nodes"] = float(len(problem.names))
-        nodes = search(problem, self.config, self.seed, budget, 1.0)
-        order = problem.cluster_of[nodes]
-        chosen = best_choice(self.costs, [kept[c] for c in order])
-        cost = tour_cost(self.costs, chosen)
-        if problem.path_cost(nodes) <= cost:
-            chosen, cost = problem.names[nodes], problem.path_cost(nodes)
+        if not prove_it or late or budget.check(0, cost):
+            return self._tour(problem.names[nodes], bound)
         budget.note(cost)
-        return self._tour(chosen, cost)
+        proof = prove(problem, cost, lambda: budget.check(0, budget.cost), config.proof_states)
+        self.detail["paths"] = float(proof.paths)
+        if proof.nodes is not None:
+            nodes = proof.nodes
+        elif proof.complete and cost == math.inf:
+            return self._failed(infeasible=True)
+        return self._tour(problem.names[nodes], max(bound, proof.bound), proven=proof.complete)
 
-    def _tour(
-        self, nodes: IntArray, cost: float, *, bound: float = -math.inf, proven: bool = False
-    ) -> Tour:
+    def _tour(self, nodes: IntArray, bound: float = -math.inf, *, proven: bool = False) -> Tour:
+        cost = tour_cost(self.costs, nodes)
         if cost == math.inf:
-            return self._nothing()
-        owner = np.empty(len(self.costs), dtype=np.int64)
-        for index, cluster in enumerate(self.members):
-            owner[cluster] = index
-        first = int(np.flatnonzero(owner[nodes] == 0)[0])
-        status = TourStatus.OPTIMAL if proven else TourStatus.FEASIBLE
+            return self._failed()
+        self.budget.note(cost)
+        first = int(np.isin(nodes, self.members[0]).argmax())
         return Tour(
-            tuple(int(node) for node in np.roll(nodes, -first)),
+            tuple(np.roll(nodes, -first).tolist()),
             cost,
             cost if proven else min(bound, cost),
-            status,
-            self._stats(),
+            TourStatus.OPTIMAL if proven else TourStatus.FEASIBLE,
+            self._stats(self.budget.best_s),
         )
 
-    def _nothing(self) -> Tour:
+    def _failed(self, infeasible: bool = False) -> Tour:
+        if infeasible:
+            return Tour((), math.inf, math.inf, TourStatus.INFEASIBLE, self._stats())
         cancelled = self.stop is not None and self.stop.cancelled
-        return self._failed(TourStatus.CANCELLED if cancelled else TourStatus.TIMED_OUT, -math.inf)
+        status = TourStatus.CANCELLED if cancelled else TourStatus.TIMED_OUT
+        return Tour((), math.inf, -math.inf, status, self._stats())
 
-    def _failed(self, status: TourStatus, bound: float) -> Tour:
-        return Tour((), math.inf, bound, status, replace(self._stats(), best_s=math.nan))
-
-    def _stats(self) -> TourStats:
+    def _stats(self, best_s: float = math.nan) -> TourStats:
         budget = self.budget
-        return TourStats(budget.elapsed, budget.best_s, budget.used, self.method, self.detail)
+        return TourStats(budget.elapsed, best_s, budget.used, self.method, self.detail)
 
 
 def warm_up_solver(proof: bool = True) -> None:

@@ -14,39 +14,6 @@ from pushplan.compiled import kernel
 from pushplan.world.checks import FloatArray, IntArray
 
 
-@kernel(allocates=True)
-def memory_moves(
-    lists: IntArray,  # (n, b) the clusters that each cluster remembers
-) -> IntArray:
-    """(n, n, 2^b) new memory with cluster d before a walk from e, -1 where d is remembered."""
-    count, bits = lists.shape
-    moves = np.full((count, count, 1 << bits), -1, np.int64)
-    kept = np.empty(bits, np.int64)  # what d remembers of each cluster that e remembers
-    for d in range(count):
-        for e in range(count):
-            if d == e:
-                continue
-            forbidden, of_e = 0, 0
-            for j in range(bits):
-                kept[j] = 0
-                if lists[e, j] == d:
-                    forbidden = 1 << j
-                if lists[d, j] == e:
-                    of_e = 1 << j
-                for k in range(bits):
-                    if lists[d, k] == lists[e, j]:
-                        kept[j] = 1 << k
-            for memory in range(1 << bits):
-                if memory & forbidden:
-                    continue
-                new = of_e
-                for j in range(bits):
-                    if (memory >> j) & 1:
-                        new |= kept[j]
-                moves[d, e, memory] = new
-    return moves
-
-
 @kernel
 def extend_walks(
     walks: FloatArray,  # (n, 2^b, K) cost of the cheapest walk of k arcs from a node to the root
@@ -76,72 +43,10 @@ def extend_walks(
                             out[i] = min(out[i], value + row[i])
 
 
-@kernel
-def read_visits(
-    walks: FloatArray,  # (n, n, 2^b, K) by number of arcs less 1
-    first: FloatArray,  # (n, K) cost from the root to each node
-    blocks: FloatArray,  # (n, K, n, K)
-    moves: IntArray,  # (n, n, 2^b)
-    prices: FloatArray,  # (n,)
-    sizes: IntArray,  # (n,)
-    visits: IntArray,  # (n,) filled with how often it comes to each cluster
-) -> float:
-    """Cost less prices of the cheapest walk from the root through n nodes and back; its visits."""
-    count, memories = walks.shape[1], walks.shape[2]
-    visits[:] = 0
-    best = np.inf
-    d, at, i = -1, 0, 0
-    next_d, next_at, next_i = 0, 0, 0
-    for e in range(count):
-        for memory in range(memories):
-            for j in range(sizes[e]):
-                x = walks[count - 1, e, memory, j] - prices[e] + first[e, j]
-                if x < best:
-                    best, d, at, i = x, e, memory, j
-    if d < 0:
-        return best
-    visits[d] = 1
-    for k in range(count - 1, 0, -1):
-        value, found = walks[k, d, at, i], False
-        for e in range(count):
-            for memory in range(memories):
-                if found or moves[d, e, memory] != at:
-                    continue
-                for j in range(sizes[e]):
-                    if not found and (
-                        walks[k - 1, e, memory, j] - prices[e] + blocks[e, j, d, i] == value
-                    ):
-                        found = True
-                        next_d, next_at, next_i = e, memory, j
-            if found:
-                break
-        if not found:
-            break
-        d, at, i = next_d, next_at, next_i
-        visits[d] += 1
-    return best
-
-
-@kernel
-def allow_memories(walks: FloatArray) -> None:
-    """Turn the entries ``walks[:, M]`` into the least of all memories that lie within M."""
-    count, memories, width = walks.shape
-    for d in range(count):
-        bit = 1
-        while bit < memories:
-            for memory in range(memories):
-                if memory & bit:
-                    for i in range(width):
-                        x = walks[d, memory ^ bit, i]
-                        if x < walks[d, memory, i]:
-                            walks[d, memory, i] = x
-            bit <<= 1
-
-
 class PathProblem(NamedTuple):
     """What bounds the paths of one length."""
 
-    within: FloatArray  # (n, 2^b, K) walks to the root from the new node, by `allow_memories`
+    within: FloatArray  # (n, 2^b, K) walks to the root from the new node, by `Walks.allow_memories`
     costs: FloatArray  # (n, K, n, K) from a node (first two) to a node
     lists: IntArray  # (n, b) the clusters that each cluster remembers
     prices: FloatArray  # (n,) what a visit of each cluster earns

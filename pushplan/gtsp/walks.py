@@ -12,7 +12,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pushplan.gtsp.walk_kernels import allow_memories, extend_walks, memory_moves, read_visits
+from pushplan.gtsp.problem import Padded
+from pushplan.gtsp.walk_kernels import extend_walks
 from pushplan.world.checks import FloatArray, IntArray
 
 MARGIN = 1e-10
@@ -39,49 +40,45 @@ class Walks:
         stopped: Callable[[], bool],
     ) -> None:
         finite = costs[np.isfinite(costs)]
-        self.margin = MARGIN * float(np.abs(finite).max()) if finite.size else 0.0
+        self.margin = MARGIN * float(np.abs(finite).max(initial=0.0))
         whole = bool((finite == np.round(finite)).all()) and self.margin < 0.25
         self.goal = limit
-        self.limit = limit - (0.5 if whole and np.isfinite(limit) else self.margin)
+        self.limit = limit - (0.5 if whole else self.margin)
         self.node, self.count, self.lists = node, len(members), lists
         self.prices = np.zeros(self.count)
         self.bound = -np.inf
+        self.paths = 0  # looked at by `cheaper_tour`
         self._all, self._stopped = costs, stopped
         self._gather(members)
-        self.remember(0)
 
     def _gather(self, members: list[IntArray]) -> None:
-        """Costs between these nodes, padded with infinities to K nodes a cluster."""
-        self.members = members
-        self.sizes = np.array([len(nodes) for nodes in members], dtype=np.int64)
-        self.width = int(self.sizes.max())
-        self.names = np.full((self.count, self.width), -1)
-        for cluster, nodes in enumerate(members):
-            self.names[cluster, : len(nodes)] = nodes
-        flat = self.names.ravel()
-        costs = self._all[np.ix_(flat, flat)]
-        costs[flat < 0] = np.inf
-        costs[:, flat < 0] = np.inf
-        self.costs = costs.reshape(self.names.shape * 2)  # (n, K, n, K) from, to
-        self.blocks = np.ascontiguousarray(self.costs.transpose(2, 3, 0, 1))  # to, from
-        self.first = np.where(self.names < 0, np.inf, self._all[self.node, self.names])
-        self.last = np.where(self.names < 0, np.inf, self._all[self.names, self.node])
+        """Costs between these nodes."""
+        self.nodes = Padded.gather(self._all, members)
+        self.width = self.nodes.names.shape[1]
+        self.blocks = np.ascontiguousarray(self.nodes.costs.transpose(2, 3, 0, 1))  # to, from
+        self.first = self.nodes.pick(self._all[self.node])
+        self.last = self.nodes.pick(self._all[:, self.node])
 
     def look(self) -> None:
         """Ask the stop rule."""
         if self._stopped():
             raise StopFired
 
-    def size_with(self, bits: int) -> tuple[float, float]:
-        """Numbers in the table, and arcs to look at, with a memory of so many clusters."""
-        numbers = self.count**2 * 2.0**bits * self.width
-        return numbers, numbers * self.count * self.width
-
     def remember(self, bits: int) -> None:
         """Make walks know so many clusters of each list."""
         self.bits = bits
         self.known = np.ascontiguousarray(self.lists[:, :bits])
-        self._moves = memory_moves(self.known)
+        bit = 1 << np.arange(bits)
+        memories = np.arange(1 << bits)[:, None] & bit > 0
+        holds = np.zeros((self.count, 1 << bits, self.count), dtype=bool)  # memory M of e holds d
+        np.put_along_axis(holds, self.known[:, None], memories, 2)
+        # moves[d, e, M]: new memory with cluster d before a walk from e, -1 where d is remembered
+        self._moves = np.empty((self.count, self.count, 1 << bits), dtype=np.int64)
+        for d, known in enumerate(self.known):
+            new = holds[:, :, known]
+            new[known, :, np.arange(bits)] = True
+            self._moves[d] = np.where(holds[:, :, d], -1, new @ bit)
+            self._moves[d, d] = -1
         self._empty()
 
     def _empty(self) -> None:
@@ -91,9 +88,10 @@ class Walks:
     def _longer(self, walks: FloatArray, longer: FloatArray, blocks: FloatArray) -> None:
         per_cluster = self.count * len(walks[0]) * self.width**2
         step = max(1, CHUNK_ARCS // per_cluster)
+        sizes = self.nodes.sizes
         for low in range(0, self.count, step):
             high = min(low + step, self.count)
-            extend_walks(walks, longer, blocks, self._moves, self.prices, self.sizes, low, high)
+            extend_walks(walks, longer, blocks, self._moves, self.prices, sizes, low, high)
             self.look()
 
     def fill(self) -> None:
@@ -103,26 +101,32 @@ class Walks:
         for k in range(1, self.count):
             self._longer(self.walks[k - 1], self.walks[k], self.blocks)
 
+    def _cheapest(self) -> tuple[float, IntArray]:
+        """Cost less prices of the cheapest walk from the root and back, and its visits."""
+        visits = np.zeros(self.count, dtype=np.int64)
+        costs = self.walks[-1] - self.prices[:, None, None] + self.first[:, None]
+        d, memory, i = np.unravel_index(costs.argmin(), costs.shape)
+        if costs[d, memory, i] == np.inf:
+            return np.inf, visits
+        visits[d] = 1
+        value = self.walks[-1, d, memory, i]
+        for walks in self.walks[-2::-1]:
+            clusters, memories = np.nonzero(self._moves[d] == memory)
+            before = walks[clusters, memories] - self.prices[clusters, None]
+            row, j = divmod((before + self.blocks[clusters, :, d, i] == value).argmax(), self.width)
+            d, memory, i = clusters[row], memories[row], j
+            value = walks[d, memory, i]
+            visits[d] += 1
+        return float(costs.min()), visits
+
     def ascend(self, steps: int) -> None:
         """Subgradient steps on the prices; leaves the best ones, and a table to be filled."""
-        visits = np.zeros(self.count, dtype=np.int64)
         best, top = self.prices, -np.inf
         scale, since = 1.0, 0
         for _ in range(steps):
             self.fill()
-            value = (
-                float(self.prices.sum())
-                - self.margin
-                + read_visits(
-                    self.walks,
-                    self.first,
-                    self.blocks,
-                    self._moves,
-                    self.prices,
-                    self.sizes,
-                    visits,
-                )
-            )
+            cost, visits = self._cheapest()
+            value = float(self.prices.sum()) - self.margin + cost
             self.bound = max(self.bound, value)
             since += 1
             if value > top:
@@ -143,22 +147,22 @@ class Walks:
         Fills the table.
 
         Returns:
-            Whether every cluster has a node left.
+            True if every cluster has a node left.
         """
         self.fill()
         ahead, longer = np.full_like(self.walks[0], np.inf), np.empty_like(self.walks[0])
         ahead[:, 0] = self.first
-        through = np.full(self.names.shape, np.inf)  # (n, K)
+        through = np.full(self.first.shape, np.inf)  # (n, K)
         for k in range(self.count):
             np.minimum(through, ahead.min(axis=1) + self.walks[-1 - k].min(axis=1), out=through)
             if k + 1 < self.count:
-                self._longer(ahead, longer, self.costs)
+                self._longer(ahead, longer, self.nodes.costs)
                 ahead, longer = longer, ahead
         keep = through + (self.prices.sum() - self.prices)[:, None] < self.limit
         if not keep.any(axis=1).all():
             return False
-        if keep.sum() < self.sizes.sum():
-            self._gather([row[kept] for row, kept in zip(self.names, keep, strict=True)])
+        if keep.sum() < self.nodes.sizes.sum():
+            self._gather([row[kept] for row, kept in zip(self.nodes.names, keep, strict=True)])
             self._empty()
             self.fill()
         return True
@@ -166,5 +170,7 @@ class Walks:
     def allow_memories(self) -> None:
         """Turn the entry of every memory M into the least of those within M."""
         for walks in self.walks:
-            allow_memories(walks)
+            for b in range(self.bits):
+                halves = walks.reshape(self.count, -1, 2, 1 << b, self.width)  # without b, with it
+                np.minimum(halves[:, :, 1], halves[:, :, 0], out=halves[:, :, 1])
             self.look()
