@@ -145,16 +145,12 @@ class Problem:
         near = np.ascontiguousarray(order[:, :most])
         return near, np.ascontiguousarray(np.take_along_axis(between, near, 1))
 
-    def path_cost(self, nodes: Sequence[int] | IntArray) -> float:
-        """Cost of a closed tour of own node numbers, rounded once; 0 for a single node."""
-        return tour_cost(self.costs, nodes)
 
-
-def tour_cost(costs: NDArray[np.number], nodes: Sequence[int] | IntArray) -> float:
+def tour_cost(costs: NDArray[np.number], nodes: IntArray) -> float:
     """Cost of a closed tour: the sum of its arcs, rounded once; 0 for a single node."""
     if len(nodes) < 2:
         return 0.0
-    arcs = costs[np.asarray(nodes), np.roll(nodes, -1)]
+    arcs = costs[nodes, np.append(nodes[1:], nodes[0])]
     return math.inf if np.isinf(arcs).any() else math.fsum(arcs.tolist())
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pushplan.gtsp.problem import Problem
+from pushplan.gtsp.problem import Problem, tour_cost
 from pushplan.gtsp.walk_kernels import PathProblem, Paths, extend_paths
 from pushplan.gtsp.walks import CHUNK_ARCS, StopFired, Walks
 from pushplan.world.checks import FloatArray, IntArray
@@ -63,7 +63,7 @@ def prove(
             done, nodes = False, None
         result.paths += walks.paths
         if nodes is not None:
-            result.nodes, limit = nodes, problem.path_cost(nodes)
+            result.nodes, limit = nodes, tour_cost(problem.costs, nodes)
         result.bound = min(result.bound, min(walks.limit, limit) if done else walks.bound)
         result.complete = result.complete and done
         if result.bound == -np.inf:  # it cannot get better

@@ -9,7 +9,7 @@ import numpy as np
 
 from pushplan.gtsp.gtsp_config import GtspConfig
 from pushplan.gtsp.node_choice_kernels import SPARE, best_nodes
-from pushplan.gtsp.problem import Problem
+from pushplan.gtsp.problem import Problem, tour_cost
 from pushplan.gtsp.ruin_recreate_kernels import TourProblem, TourState, search_tours
 from pushplan.world.checks import FloatArray, IntArray
 from pushplan.world.stop import MaxIterations, Stop, StopCheck, rules_of
@@ -206,7 +206,7 @@ class AnytimeSearch:
 
     def _note_best(self) -> None:
         if self.tour.values[1] < self.budget.cost:
-            self.budget.note(self.problem.path_cost(self.tour.best_nodes))
+            self.budget.note(tour_cost(self.problem.costs, self.tour.best_nodes))
 
     def _random_start(self) -> None:
         problem, tour = self.problem, self.tour

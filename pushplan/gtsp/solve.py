@@ -159,7 +159,7 @@ class _SolverCall:
             return self._tour(nodes)
         members = problem.members
         nodes = best_choice(problem.costs, [members[c] for c in order])
-        cost, bound = problem.path_cost(nodes), problem.floor
+        cost, bound = tour_cost(problem.costs, nodes), problem.floor
         late = budget.elapsed + PROOF_SETUP_S * len(problem.names) ** 2 > budget.seconds
         if not prove_it or late or budget.check(0, cost):
             return self._tour(problem.names[nodes], bound)
@@ -177,9 +177,10 @@ class _SolverCall:
         if cost == math.inf:
             return self._failed()
         self.budget.note(cost)
-        first = int(np.isin(nodes, self.members[0]).argmax())
+        order, begin = nodes.tolist(), set(self.members[0].tolist())
+        first = next(place for place, node in enumerate(order) if node in begin)
         return Tour(
-            tuple(np.roll(nodes, -first).tolist()),
+            (*order[first:], *order[:first]),
             cost,
             cost if proven else min(bound, cost),
             TourStatus.OPTIMAL if proven else TourStatus.FEASIBLE,

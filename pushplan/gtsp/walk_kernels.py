@@ -43,6 +43,52 @@ def extend_walks(
                             out[i] = min(out[i], value + row[i])
 
 
+@kernel
+def read_visits(
+    walks: FloatArray,  # (n, n, 2^b, K) by number of arcs less 1
+    first: FloatArray,  # (n, K) cost from the root to each node
+    blocks: FloatArray,  # (n, K, n, K)
+    moves: IntArray,  # (n, n, 2^b)
+    prices: FloatArray,  # (n,)
+    sizes: IntArray,  # (n,)
+    visits: IntArray,  # (n,) filled with how often it comes to each cluster
+) -> float:
+    """Cost less prices of the cheapest walk from the root through n nodes and back; its visits."""
+    count, memories = walks.shape[1], walks.shape[2]
+    visits[:] = 0
+    best = np.inf
+    d, at, i = -1, 0, 0
+    next_d, next_at, next_i = 0, 0, 0
+    for e in range(count):
+        for memory in range(memories):
+            for j in range(sizes[e]):
+                x = walks[count - 1, e, memory, j] - prices[e] + first[e, j]
+                if x < best:
+                    best, d, at, i = x, e, memory, j
+    if d < 0:
+        return best
+    visits[d] = 1
+    for k in range(count - 1, 0, -1):
+        value, found = walks[k, d, at, i], False
+        for e in range(count):
+            for memory in range(memories):
+                if found or moves[d, e, memory] != at:
+                    continue
+                for j in range(sizes[e]):
+                    if not found and (
+                        walks[k - 1, e, memory, j] - prices[e] + blocks[e, j, d, i] == value
+                    ):
+                        found = True
+                        next_d, next_at, next_i = e, memory, j
+            if found:
+                break
+        if not found:
+            break
+        d, at, i = next_d, next_at, next_i
+        visits[d] += 1
+    return best
+
+
 class PathProblem(NamedTuple):
     """What bounds the paths of one length."""
 

@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from pushplan.gtsp.problem import Padded
-from pushplan.gtsp.walk_kernels import extend_walks
+from pushplan.gtsp.walk_kernels import extend_walks, read_visits
 from pushplan.world.checks import FloatArray, IntArray
 
 MARGIN = 1e-10
@@ -101,31 +101,22 @@ class Walks:
         for k in range(1, self.count):
             self._longer(self.walks[k - 1], self.walks[k], self.blocks)
 
-    def _cheapest(self) -> tuple[float, IntArray]:
-        """Cost less prices of the cheapest walk from the root and back, and its visits."""
-        visits = np.zeros(self.count, dtype=np.int64)
-        costs = self.walks[-1] - self.prices[:, None, None] + self.first[:, None]
-        d, memory, i = np.unravel_index(costs.argmin(), costs.shape)
-        if costs[d, memory, i] == np.inf:
-            return np.inf, visits
-        visits[d] = 1
-        value = self.walks[-1, d, memory, i]
-        for walks in self.walks[-2::-1]:
-            clusters, memories = np.nonzero(self._moves[d] == memory)
-            before = walks[clusters, memories] - self.prices[clusters, None]
-            row, j = divmod((before + self.blocks[clusters, :, d, i] == value).argmax(), self.width)
-            d, memory, i = clusters[row], memories[row], j
-            value = walks[d, memory, i]
-            visits[d] += 1
-        return float(costs.min()), visits
-
     def ascend(self, steps: int) -> None:
         """Subgradient steps on the prices; leaves the best ones, and a table to be filled."""
+        visits = np.zeros(self.count, dtype=np.int64)
         best, top = self.prices, -np.inf
         scale, since = 1.0, 0
         for _ in range(steps):
             self.fill()
-            cost, visits = self._cheapest()
+            cost = read_visits(
+                self.walks,
+                self.first,
+                self.blocks,
+                self._moves,
+                self.prices,
+                self.nodes.sizes,
+                visits,
+            )
             value = float(self.prices.sum()) - self.margin + cost
             self.bound = max(self.bound, value)
             since += 1

@@ -542,9 +542,9 @@ def test_runs_begin_at_random_as_long_as_there_is_time_for_one(monkeypatch, each
     """Runs that end early leave time for others: 35ftv170 missed its best tour otherwise."""
     made = []
 
-    def run(self, budget, begin, end, again=False):
+    def run(self, begin, end, again=False):
         made.append(again)
-        budget.used += each
+        self.budget.used += each
 
     monkeypatch.setattr(AnytimeSearch, "run", run)
     costs, clusters = instance("uniform", 1000)
