@@ -159,9 +159,11 @@ def measure(folder: Path) -> tuple[dict[str, str], list[str]]:
     modules = read(folder)
     root = folder.name
     compiled = [kernel for module in modules for kernel in kernels(module)]
-    crossing, loops = between_families(modules, root), circles(modules, root)
+    crossing = between_families(modules, root)
+    loops = circles(modules, root)
     wide = sum(len(kernel.args.args) >= MANY_ARGUMENTS for kernel in compiled)
-    rooms, nodes = Counter[str](), Counter[str]()
+    rooms = Counter[str]()
+    nodes = Counter[str]()
     for module in modules:
         room = module.name.split(".")[1] if "." in module.name else root
         rooms[room] += module.lines

@@ -79,7 +79,8 @@ def describe(error: BaseException) -> str:
         text = one_line(str(error))
     except BaseException:  # its text may be code of a stranger
         text = ""
-    name, where = type(error).__name__, place(error)
+    name = type(error).__name__
+    where = place(error)
     return one_line(f"{name}{': ' if text else ''}{text}{f' ({where})' if where else ''}")
 
 
@@ -89,7 +90,8 @@ def place(error: BaseException) -> str:
     A user's is what belongs neither to pushplan nor to Python nor to an installed library. Empty
     if there is no such frame, or the message says the place itself, as that of a SyntaxError.
     """
-    frame, found = error.__traceback__, ""
+    frame = error.__traceback__
+    found = ""
     while frame is not None and not isinstance(error, SyntaxError):
         file = frame.tb_frame.f_code.co_filename
         if is_a_users(file):

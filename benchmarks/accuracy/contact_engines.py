@@ -24,7 +24,9 @@ ROUNDS = 7
 
 def compare(concentration: float, scenes: int) -> None:
     models = (QuasiStatic(friction=1.0), IceInteraction())
-    seconds, work, steps = np.zeros((ROUNDS, 2)), np.zeros(2), 0
+    seconds = np.zeros((ROUNDS, 2))
+    work = np.zeros(2)
+    steps = 0
     for seed in range(scenes):
         variations = {"concentration": concentration}
         env = make(Scenario("ship_ice", variations=variations, seed=seed), observation="state")

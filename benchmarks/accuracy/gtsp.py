@@ -61,7 +61,10 @@ def exact(seeds: int) -> None:
 
 def proofs(seeds: int) -> None:
     """20 boxes: when the optimum was found, when it was proven."""
-    found, proven, late, missed = [], [], 0, 0
+    found = []
+    proven = []
+    late = 0
+    missed = 0
     for seed in range(FIRST_SEED, FIRST_SEED + max(seeds, 20)):
         costs, clusters = pushes(20, 16, np.random.default_rng(seed))
         config = GtspConfig(method="search", lower_bound=True, proof_fraction=1.0 - SEARCH_SHARE)
@@ -123,10 +126,12 @@ def families(first: int, seeds: int, budgets: list[float]) -> None:
     costs: dict[tuple[str, float], list[tuple[str, float]]] = {}
     for family in FAMILIES:
         for made in range(first, first + len(SIZES)):
-            name, (arcs, clusters) = f"{family}-{made}", instance(family, made)
+            name = f"{family}-{made}"
+            (arcs, clusters) = instance(family, made)
             for seconds in budgets:
                 for seed in range(FIRST_SEED, FIRST_SEED + seeds):
-                    rng, stop = np.random.default_rng(seed), Deadline(seconds)
+                    rng = np.random.default_rng(seed)
+                    stop = Deadline(seconds)
                     cost = solve_gtsp(arcs, clusters, stop=stop, rng=rng).cost
                     known[name] = min(cost, known.get(name, cost))
                     costs.setdefault((family, seconds), []).append((name, cost))

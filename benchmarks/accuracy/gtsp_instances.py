@@ -65,10 +65,12 @@ def towns(rng: np.random.Generator, count: int) -> Instance:
 
 def drilling(rng: np.random.Generator, count: int) -> Instance:
     """Holes of a circuit board: rows of pins on a grid, and single holes; Euclidean costs."""
-    nodes, holes = NODES_PER_CLUSTER * count, set[tuple[int, int]]()
+    nodes = NODES_PER_CLUSTER * count
+    holes = set[tuple[int, int]]()
     while len(holes) < nodes:
         x, y = (int(v) for v in rng.integers(0, 38, 2) * 100)
-        pins, across = int(rng.choice((1, 1, 4, 7, 8))), bool(rng.integers(2))
+        pins = int(rng.choice((1, 1, 4, 7, 8)))
+        across = bool(rng.integers(2))
         for pin in range(pins):
             for row in range(2 if pins > 1 else 1):
                 step = (100 * pin, 300 * row)
@@ -104,7 +106,8 @@ def roads(rng: np.random.Generator, count: int) -> Instance:
     there = np.concatenate([number[:, 1:].ravel(), number[1:].ravel()])
     length = rng.integers(5, 30, len(here))
     ways = rng.random((2, len(here)))
-    forward, backward = ways[0] < 0.75, (ways[0] >= 0.75) | (ways[1] < 0.5)
+    forward = ways[0] < 0.75
+    backward = (ways[0] >= 0.75) | (ways[1] < 0.5)
     # the wrong way takes eight times as long, which keeps every corner within reach
     slow = 8 * length
     rows = np.concatenate([here, there])

@@ -21,7 +21,8 @@ from pushplan.scenarios import Scenario
 from pushplan.world import World
 from pushplan.world.checks import FloatArray
 
-STEPS, SPACING = 120, 0.1
+STEPS = 120
+SPACING = 0.1
 
 
 def random_drive(world: World, rng: np.random.Generator) -> FloatArray:
@@ -36,7 +37,8 @@ def random_drive(world: World, rng: np.random.Generator) -> FloatArray:
 
 
 def compare(boxes: int, scenes: int) -> None:
-    quick, slow = QuasiStatic(), RolloutInteraction()
+    quick = QuasiStatic()
+    slow = RolloutInteraction()
     rows: list[tuple[float, float, float]] = []
     per_object: list[tuple[float, float]] = []
     quick_s = slow_s = 0.0
@@ -52,7 +54,8 @@ def compare(boxes: int, scenes: int) -> None:
         a: Interaction = quick.sweep(world, path)
         middle = time.perf_counter()
         b = slow.sweep(world, path)
-        quick_s, slow_s = quick_s + middle - began, slow_s + time.perf_counter() - middle
+        quick_s = quick_s + middle - began
+        slow_s = slow_s + time.perf_counter() - middle
         last = min(i if i >= 0 else STEPS for i in (a.jammed_at, b.jammed_at))
         jams += b.jammed_at >= 0
         agree += (a.jammed_at >= 0) == (b.jammed_at >= 0)

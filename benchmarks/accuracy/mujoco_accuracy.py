@@ -28,7 +28,9 @@ from pushplan.envs.tasks.ship_ice import ShipIceTask
 from pushplan.world import Drive, GoalDisc, Movables, RobotModel, StaticMap, Twist, World, stream
 from pushplan.world.checks import FloatArray
 
-SIDE, STEP, STEPS = 0.08, 0.2, 25
+SIDE = 0.08
+STEP = 0.2
+STEPS = 25
 MATERIALS = Materials(
     robot_object=0.4,
     object_object=0.4,
@@ -79,7 +81,9 @@ def drive(boxes: int, seed: int, options: MujocoOptions) -> tuple[FloatArray, Fl
     """Final positions (K, 2), path lengths (K,) of the boxes [m], and wall-clock time [s]."""
     simulator = MujocoSimulator(options)
     simulator.build(scene(boxes, seed), MATERIALS)
-    rng, lengths, command = stream(seed, "drive"), np.zeros(boxes), Twist(0.2, 0.0)
+    rng = stream(seed, "drive")
+    lengths = np.zeros(boxes)
+    command = Twist(0.2, 0.0)
     began = time.perf_counter()
     for i in range(STEPS):
         if i % 5 == 0:

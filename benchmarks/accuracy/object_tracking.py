@@ -24,9 +24,14 @@ from pushplan.world import InvalidInputError, Movables
 from pushplan.world.checks import FloatArray
 from pushplan.world.outline import centroid, transform
 
-PERIOD, SETTLED = 0.1, 3.0  # [s]
-PITCH, SIZE = 0.16, 0.04  # distance of neighbours, half the side of a box [m]
-NOISES, COUNTS = (0.001, 0.002, 0.005, 0.01, 0.02), (5, 20, 100)
+# [s]
+PERIOD = 0.1
+SETTLED = 3.0
+# distance of neighbours, half the side of a box [m]
+PITCH = 0.16
+SIZE = 0.04
+NOISES = (0.001, 0.002, 0.005, 0.01, 0.02)
+COUNTS = (5, 20, 100)
 
 
 class Scene:
@@ -73,10 +78,13 @@ def _outline(rng: np.random.Generator) -> FloatArray:
 def run(count: int, noise: float, seconds: float, hidden: float, seed: int) -> Score:
     """Track ``count`` objects with a standard deviation ``noise`` [m] of each corner."""
     rng = np.random.default_rng(seed)
-    scene, tracker = Scene(count, rng), ObjectTracker()
+    scene = Scene(count, rng)
+    tracker = ObjectTracker()
     owner: dict[int, int] = {}
     offsets: list[list[float]] = [[] for _ in range(count)]
-    places, raw_places, times = [], [], []
+    places = []
+    raw_places = []
+    times = []
     switches = sightings = refused = 0
     stamps = np.arange(0.0, seconds, PERIOD)
     for stamp in stamps.tolist():
@@ -137,7 +145,8 @@ def _difference(outline: FloatArray, truth: FloatArray, heading: float) -> float
         np.full(1, 0.1),
         sampled=True,
     )
-    centre, turn = fit.centres[0], -heading + float(fit.turns[0])
+    centre = fit.centres[0]
+    turn = -heading + float(fit.turns[0])
     laid = shapely.Polygon(transform((centre.real, centre.imag, turn), outline))
     real = shapely.Polygon(truth)
     return float(laid.symmetric_difference(real).area / real.area)

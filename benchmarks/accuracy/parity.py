@@ -117,7 +117,8 @@ def compare(case: Case) -> tuple[dict[str, NDArray[np.float64]], World, World]:
     """How far apart the two end."""
     flat, starts, flat_lengths = run(case, "pymunk")
     solid, _, solid_lengths = run(case, "mujoco")
-    a, b = flat.movables.poses, solid.movables.poses
+    a = flat.movables.poses
+    b = solid.movables.poses
     moved = np.maximum(np.hypot(*(a - starts)[:, :2].T), np.hypot(*(b - starts)[:, :2].T)) > 1e-3
     turn = np.remainder(flat.robot_pose[2] - solid.robot_pose[2] + np.pi, 2 * np.pi) - np.pi
     found = {

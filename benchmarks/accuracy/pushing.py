@@ -59,7 +59,8 @@ from pushplan.world.checks import FloatArray
 SQUARE = 0.5 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 OPEN = StaticMap.build(bounds=[-100.0, -100.0, 100.0, 100.0])
 ELSEWHERE = Receptacle(SQUARE + 90.0)
-PERIOD, DELAY = 0.2, 0.1
+PERIOD = 0.2
+DELAY = 0.1
 NOISE = np.array([0.02, 0.02, math.radians(3.0)])
 CURVES = {
     "S": [(1.0, 0.0), (2.5, 0.4), (2.5, -0.4), (1.0, 0.0)],
@@ -127,7 +128,8 @@ DISTURBANCES = (
 
 def settings() -> list[Setting]:
     """Robots and boxes of the tasks, with the friction that `gtsp-mpc` assumes."""
-    planar, corners = spread_of("inertia", SQUARE), spread_of("corners", SQUARE)
+    planar = spread_of("inertia", SQUARE)
+    corners = spread_of("corners", SQUARE)
     burger = turtlebot3_burger("pusher", max_speed=0.2, max_turn_rate=0.785)
     told = PushParameters(0.2, planar)
     return [
@@ -187,13 +189,18 @@ def drive(
     """Push a box until it is at the end of its path, or lost."""
     rng = np.random.default_rng(seed)
     model = PushModel(setting.robot, setting.side * SQUARE, setting.parameters)
-    length, half = model.reach, model.bumper.half
+    length = model.reach
+    half = model.bumper.half
     path = PushPath.arcs(np.zeros(3), [(a * length, b / length) for a, b in CURVES[pieces]])
     way = shapely.LineString(path.poses[:, :2])
     world, simulator = scene(setting, off, path, rng)
-    plan, controller = path.plan(setting.robot, 0), make(setting, off, world)
-    before, lost, driven = Twist(0.0, 0.0), True, 0.0
-    errors, times = [], []
+    plan = path.plan(setting.robot, 0)
+    controller = make(setting, off, world)
+    before = Twist(0.0, 0.0)
+    lost = True
+    driven = 0.0
+    errors = []
+    times = []
     for _ in range(round(2.0 * plan.times[-1] / PERIOD)):
         seen = simulator.world()
         if off.noisy:
@@ -209,7 +216,8 @@ def drive(
             simulator.step(before, DELAY)
             before = twist
         simulator.step(twist, PERIOD - (DELAY if off.late else 0.0))
-        robot, box = simulator.robot_pose, simulator.object_poses[0]
+        robot = simulator.robot_pose
+        box = simulator.object_poses[0]
         driven += float(np.hypot(*(robot - was)[:2])) / length
         along = way.project(shapely.Point(box[:2]))
         errors.append(way.distance(shapely.Point(box[:2])) / length)
@@ -232,7 +240,8 @@ def predictive(setting: Setting, off: Disturbance, world: World, **changes: Any)
 
 
 def told(setting: Setting, off: Disturbance, world: World) -> Controller:
-    delay, gain = DELAY if off.late else 0.0, 0.3 if off.noisy else 1.0
+    delay = DELAY if off.late else 0.0
+    gain = 0.3 if off.noisy else 1.0
     return predictive(setting, off, world, delay=delay, observer_gain=gain)
 
 
@@ -260,7 +269,8 @@ def disturbed(chosen: list[Setting], seeds: int) -> None:
                     runs = [drive(setting, off, curve, make, seed) for seed in range(seeds)]
                     kept = [run for run in runs if not run.lost]
                     errors = np.concatenate([run.errors for run in runs])
-                    rms, lost = float(np.sqrt((errors**2).mean())), len(runs) - len(kept)
+                    rms = float(np.sqrt((errors**2).mean()))
+                    lost = len(runs) - len(kept)
                     end, far = (
                         np.mean([getattr(run, key) for run in kept]) if kept else math.nan
                         for key in ("end", "driven")
@@ -282,7 +292,8 @@ def timing(chosen: list[Setting], seeds: int) -> None:
                 delay=DELAY,
                 observer_gain=0.3,
             )
-            runs, failed = [], 0
+            runs = []
+            failed = 0
             for curve, seed in itertools.product(CURVES, range(seeds)):
                 mpc = PushingMpc(config)
                 make = functools.partial(lambda mpc, *_: mpc, mpc)

@@ -31,7 +31,9 @@ def drive(
     far_away = StaticMap.build(segments=[(500, 500, 501, 500)], bounds=(-600, -600, 600, 600))
     simulator = PymunkSimulator(options)
     simulator.build(replace(task.start(stream(seed, "layout")), static=far_away), task.materials)
-    rng, lengths, turn = stream(seed, "drive"), np.zeros(boxes), 0.0
+    rng = stream(seed, "drive")
+    lengths = np.zeros(boxes)
+    turn = 0.0
     for i in range(60 if preset == "benchmark" else 100):
         if i % 8 == 0:
             turn = rng.uniform(-1.0, 1.0) * task.robot.max_turn_rate
@@ -50,7 +52,9 @@ def main() -> None:
     print("preset     boxes  moved  error: median     p95     max   work: total   worst scene")
     for preset, size in (("benchmark", 1.0), ("testbed", 0.08)):
         for boxes in (5, 10, 20):
-            errors, work, reference = [], [], []
+            errors = []
+            work = []
+            reference = []
             for seed in range(scenes):
                 ends, lengths = drive(preset, boxes, seed, default)
                 fine_ends, fine_lengths = drive(preset, boxes, seed, fine)

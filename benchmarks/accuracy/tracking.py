@@ -36,7 +36,9 @@ DELAY = 0.1
 def arcs(world: World, pieces: list[tuple[float, float]]) -> Plan:
     """A plan of arcs (length in R, curvature in 1 / R) from the robot's pose."""
     size = world.robot.circumscribed_radius
-    poses, bends, lengths = [np.array(world.robot_pose)], [], [0.0]
+    poses = [np.array(world.robot_pose)]
+    bends = []
+    lengths = [0.0]
     for length, bend in pieces:
         steps = max(1, round(length / 0.15))
         for _ in range(steps):
@@ -108,7 +110,10 @@ def drive(
     size = robot.circumscribed_radius
     late = round(delay / PERIOD)
     queue: list[tuple[float, float]] = [(max(robot.min_speed, 0.0), 0.0)] * late
-    pose, points, times, angular = np.array(world.robot_pose), [], [], 0.0
+    pose = np.array(world.robot_pose)
+    points = []
+    times = []
+    angular = 0.0
     for step in range(round(plan.length / robot.max_speed / PERIOD)):
         error = noise * np.array([size * rng.normal(), size * rng.normal(), 0.5 * rng.normal()])
         seen = world.moved(robot_pose=pose + error, time=step * PERIOD)
@@ -174,7 +179,8 @@ def main() -> None:
             for name, make in controllers(delay).items():
                 if "speed" in name and robot.drive is not Drive.DIFFERENTIAL:
                     continue
-                cells, times = [], []
+                cells = []
+                times = []
                 for world, plan in names.values():
                     errors = []
                     for seed in range(options.seeds if noise else 1):

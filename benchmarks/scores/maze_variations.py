@@ -35,9 +35,11 @@ def main() -> None:
     parser = command_line(__doc__, seeds=20)
     parser.add_argument("policy", nargs="?", default="kinodynamic-rrt")
     given = parser.parse_args()
-    name, seeds = given.policy, given.seeds
+    name = given.policy
+    seeds = given.seeds
     for preset, action, variations in CASES:
-        rows, failures = [], []
+        rows = []
+        failures = []
         began = time.perf_counter()
         for seed in range(seeds):
             scenario = Scenario("maze", preset=preset, variations=variations, seed=seed)

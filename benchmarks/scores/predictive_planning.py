@@ -32,9 +32,11 @@ NAMES = (
 
 def judged(planner: Planner, world: World, materials: Materials) -> tuple[float, ...]:
     """CPU and wall time of a call [ms], iterations, length of the path [m], work on it [kg m]."""
-    cpu, wall = time.process_time(), time.perf_counter()
+    cpu = time.process_time()
+    wall = time.perf_counter()
     result = planner.plan(world)
-    cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
+    cpu = time.process_time() - cpu
+    wall = time.perf_counter() - wall
     assert result.plan is not None, result.status
     work = RolloutInteraction(materials=materials).sweep(world, result.plan.poses).work
     return 1e3 * cpu, 1e3 * wall, float(result.stats.iterations), result.plan.length, work

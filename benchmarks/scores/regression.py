@@ -30,7 +30,8 @@ def is_time(column: str) -> bool:
 
 def compare(folder: Path, other: Path) -> int:
     """Print what differs; the number of rows that do."""
-    here, there = rows_of(folder), rows_of(other)
+    here = rows_of(folder)
+    there = rows_of(other)
     common = sorted(here.keys() & there.keys())
     differing = 0
     for key in common:

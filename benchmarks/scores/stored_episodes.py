@@ -102,7 +102,8 @@ def take(run: Path, experiment: Path) -> str:
         for label in fields["only"].get(one.name, labels)
         for start in one.scenarios
     ]
-    results, path = Results.load(run), experiment.with_suffix(".csv")
+    results = Results.load(run)
+    path = experiment.with_suffix(".csv")
     known = [row for row in results.rows if row.scenario in suites]
     found = _by_key([_texts(row, suites[row.scenario], results) for row in known])
     taken = found.keys() & set(wanted)

@@ -116,7 +116,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def renewed(page: Path, root: Path, *, write: bool) -> list[str]:
     """Make the tables of a page again; a line for each that is another now."""
-    old, name, changes = page.read_text(encoding="utf-8"), page.relative_to(root), []
+    old = page.read_text(encoding="utf-8")
+    name = page.relative_to(root)
+    changes = []
     if not old.count("<!-- table:") == old.count(END) == len(_TABLE.findall(old)):
         raise InvalidInputError(f"{name}: every '<!-- table: NAME -->' needs a '{END}' behind it")
 
@@ -140,7 +142,8 @@ def renewed(page: Path, root: Path, *, write: bool) -> list[str]:
 def _first_difference(old: str, new: str) -> str:
     pairs = zip_longest(old.splitlines(True), new.splitlines(True), fillvalue="")
     differing = [pair for pair in pairs if pair[0] != pair[1]]
-    (here, stored), more = differing[0], len(differing) - 1
+    (here, stored) = differing[0]
+    more = len(differing) - 1
     return f"{here!r}, by the stored episodes {stored!r}" + (f" and {more} more" if more else "")
 
 
@@ -219,7 +222,8 @@ def _difference_cells(
         if pair.second == wanted.differences and pair.metric in metric:
             cells = found.setdefault((pair.setting, pair.first), {})
             cells[metric[pair.metric]] = _mean(pair.difference, pair.metric, "+")
-    lines, suite = [], ""
+    lines = []
+    suite = ""
     for (setting, other), cells in found.items():
         name = "" if setting == suite else f"`{setting}`"
         suite = setting

@@ -157,7 +157,8 @@ class Collections:
 def lateness(planner: Planner, worlds: list[World], calls: int) -> FloatArray:
     """(calls, 3) wall time, own time after the last look, time in the collector [ms]."""
     rows = np.empty((calls, 3))
-    stop, collections = Watched(BUDGET_S), Collections()
+    stop = Watched(BUDGET_S)
+    collections = Collections()
     for call in range(calls):
         rng = np.random.default_rng(call)
         before = collections.seconds
@@ -179,7 +180,8 @@ def deadlines(names: list[str], calls: int) -> None:
     )
     for name in names:
         warm_up(name)
-        planner, worlds = make_planner(name), starts(name, 10)
+        planner = make_planner(name)
+        worlds = starts(name, 10)
         for world in worlds:
             planner.plan(world, stop=Deadline(BUDGET_S), rng=np.random.default_rng(0))
         gc.collect()
@@ -204,7 +206,8 @@ def any_world(names: list[str], calls: int, count: int) -> None:
     write("| planner | p50 | p99 | p99.9 | worst | over 65 ms |", "|---|---|---|---|---|---|")
     for name in names:
         warm_up(name)
-        planner, took = make_planner(name), np.empty(calls)
+        planner = make_planner(name)
+        took = np.empty(calls)
         for seed in range(-min(_FIRST, calls), calls):
             rng = np.random.default_rng(abs(seed))
             world = posts(count, seed % 2**32, name) if count else random_world(seed % 2**32, name)
@@ -250,7 +253,9 @@ def heap_in_use() -> float:
 
 def growth(name: str, call: Callable[[int], object], calls: int) -> None:
     """Write a row: time of a call, memory after a tenth of the calls and at the end, growth."""
-    marks, heap, began = [], [], time.perf_counter()
+    marks = []
+    heap = []
+    began = time.perf_counter()
     for number in range(calls):
         if number in (calls // 10, calls // 2):
             gc.collect()
@@ -291,7 +296,8 @@ def memory(names: list[str], calls: int, controllers: bool) -> None:
     stop = MaxIterations(20)
     for name in names:
         warm_up(name)
-        planner, worlds = make_planner(name), starts(name, 5, small=True)
+        planner = make_planner(name)
+        worlds = starts(name, 5, small=True)
 
         def call(number: int, planner: Planner = planner, worlds: list[World] = worlds) -> object:
             rng = np.random.default_rng(number)

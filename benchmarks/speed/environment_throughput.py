@@ -132,11 +132,18 @@ def measure(row: Row, seconds: float) -> dict[str, float]:
     act = driver(row)
     for i in range(3):
         env.step(act(i))
-    physics, seeing = Stopwatch(), Stopwatch()
+    physics = Stopwatch()
+    seeing = Stopwatch()
     env._simulator.step = physics.wrap(env._simulator.step)
     env._builder = TimedBuilder(env._builder, seeing)
-    stepping, simulated, resets, held = 0.0, 0.0, [], 0
-    over, stuck, age, i = True, 0, 0, 0
+    stepping = 0.0
+    simulated = 0.0
+    resets = []
+    held = 0
+    over = True
+    stuck = 0
+    age = 0
+    i = 0
     while stepping < seconds:
         if over:
             seen = seeing.seconds
@@ -144,14 +151,18 @@ def measure(row: Row, seconds: float) -> dict[str, float]:
             env.reset(seed=1 + len(resets))
             resets.append(time.perf_counter() - begin)
             seeing.seconds = seen
-            stuck, age = 0, 0
-        action, clock = act(i), env.world.time
+            stuck = 0
+            age = 0
+        action = act(i)
+        clock = env.world.time
         begin = time.perf_counter()
         *_, terminated, truncated, info = env.step(action)
         stepping += time.perf_counter() - begin
         simulated += env.world.time - clock
         held += info["held"]
-        stuck, age, i = stuck + 1 if info["held"] else 0, age + 1, i + 1
+        stuck = stuck + 1 if info["held"] else 0
+        age = age + 1
+        i = i + 1
         over = terminated or truncated or stuck == 5 or age == 100
     return {
         "rate": i / stepping,
@@ -201,7 +212,8 @@ def memory(only: str, count: int = 20) -> None:
         first = make(row)
         first.reset(seed=0)
         first.step(driver(row)(0))
-        before, kept = resident(), []
+        before = resident()
+        kept = []
         for seed in range(count):
             env = make(row)
             env.reset(seed=seed)
@@ -223,7 +235,8 @@ def step_apart(envs: Any, actions: Sequence[Any]) -> float:
     """Time [s] of the same steps where the environments of a worker do not wait for the others."""
     envs.async_reset(seed=1)
     batches = [envs.recv()[-1]["env_id"] for _ in range(envs.workers)]
-    done, owed = dict.fromkeys((batch[0] for batch in batches), 0), 0
+    done = dict.fromkeys((batch[0] for batch in batches), 0)
+    owed = 0
     begin = time.perf_counter()
     while True:
         for batch in batches:
@@ -245,7 +258,8 @@ def vector(seconds: float, only: str) -> None:
         if only not in row.name:
             continue
         make_all = partial(WorkerVectorEnv, [partial(make, row)] * COUNT)
-        one, two = make_all(workers=1), make_all(workers=2)
+        one = make_all(workers=1)
+        two = make_all(workers=2)
         act = driver(row)
         actions = [act(i) for i in range(100)]
         for envs in (one, two):

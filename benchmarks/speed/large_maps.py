@@ -82,7 +82,8 @@ def office_squares(count: int, rng: np.random.Generator) -> StaticMap:
 def free_place(static: StaticMap, rng: np.random.Generator) -> FloatArray:
     """A place 0.5 m or more from everything, well inside."""
     tree = shapely.STRtree([shapely.Polygon(part) for part in static.convex_parts])
-    low, high = static.bounds[:2] + 1.0, static.bounds[2:] - 1.0
+    low = static.bounds[:2] + 1.0
+    high = static.bounds[2:] - 1.0
     while True:
         place: FloatArray = rng.uniform(low, high)
         if not len(tree.query(shapely.Point(place).buffer(0.5), predicate="intersects")):
@@ -93,7 +94,8 @@ def scatter(static: StaticMap, count: int, rng: np.random.Generator) -> Movables
     """Boxes of 0.3 to 0.5 m."""
     boxes = []
     for _ in range(count):
-        turn, half = rng.uniform(0.0, np.pi), rng.uniform(0.15, 0.25)
+        turn = rng.uniform(0.0, np.pi)
+        half = rng.uniform(0.15, 0.25)
         ends = turn + np.pi * np.array([0.25, 0.75, 1.25, 1.75])
         outline = half * 2.0**0.5 * np.column_stack([np.cos(ends), np.sin(ends)])
         boxes.append(free_place(static, rng) + outline)
@@ -115,7 +117,8 @@ def worlds(make_map: MakeMap, objects: int, seed: int) -> Iterator[World]:
     side = float(static.bounds[2:].min())
     movables = scatter(static, objects, rng)
     while True:
-        start, end = free_place(static, rng), free_place(static, rng)
+        start = free_place(static, rng)
+        end = free_place(static, rng)
         if np.hypot(*(end - start)) < 0.5 * side:
             continue
         near = np.hypot(*(movables.poses[:, :2] - start).T) < 1.0
@@ -130,7 +133,8 @@ def worlds(make_map: MakeMap, objects: int, seed: int) -> Iterator[World]:
 
 def first_plan(name: str, world: World, seed: int) -> float:
     """CPU time until the first plan [s], infinite if there is none."""
-    planner, rng = make_planner(name), np.random.default_rng(seed)
+    planner = make_planner(name)
+    rng = np.random.default_rng(seed)
     began = time.thread_time()
     result = planner.plan(world, stop=FirstSolution() | Deadline(PATIENCE), rng=rng)
     return time.thread_time() - began if result.plan is not None else np.inf
@@ -138,7 +142,8 @@ def first_plan(name: str, world: World, seed: int) -> float:
 
 def measure(name: str, make_map: MakeMap, objects: int, calls: int) -> tuple[FloatArray, ...]:
     """CPU times [s] of first calls on new maps, and of three later calls on each."""
-    new, same = [], []
+    new = []
+    same = []
     for seed in range(calls):
         scenes = worlds(make_map, objects, seed)
         new.append(first_plan(name, next(scenes), seed))

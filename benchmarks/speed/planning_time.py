@@ -91,7 +91,8 @@ def main() -> None:
     parser = command_line(__doc__, scenes=100)
     parser.add_argument("--calls", type=int, default=1000, help="with a deadline")
     given = parser.parse_args()
-    scenes, calls = given.scenes, given.calls
+    scenes = given.scenes
+    calls = given.calls
     for name in ("straight", "geometric-rrt", "kinodynamic-rrt"):
         make_planner(name).plan(worlds(3, 1)[0], stop=MaxIterations(600))
     first_plans(scenes)

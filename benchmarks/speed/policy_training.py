@@ -30,7 +30,8 @@ def environment_speed(config: TrainingConfig) -> float:
     env.reset(seed=0)
     for _ in range(3):
         _step(env)
-    began, steps = time.process_time(), 0
+    began = time.process_time()
+    steps = 0
     while time.process_time() - began < LEAST_S:
         _step(env)
         steps += 1
@@ -84,7 +85,8 @@ def main() -> int:
     )
     for name in options.names:
         config = read_config(known[name])
-        alone, together = environment_speed(config), training_speed(config)
+        alone = environment_speed(config)
+        together = training_speed(config)
         hours = config.steps / together / 3600.0
         sys.stdout.write(
             f"| {name} | {config.steps:,} | {alone:.0f} | {together:.0f} | {hours:.2f} |\n"

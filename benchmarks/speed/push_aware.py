@@ -71,7 +71,9 @@ def anytime(names: list[str], count: int, seed: int, longest: float, clock: Cloc
     head("suite", "", *columns, "gap", "expansions/s", "shortcuts and edges/s")
     for name in names:
         planner.plan(scenes[name][0], stop=Until(1.0, clock))  # makes the table of this map
-        ratios, gaps, rates = [], [], []
+        ratios = []
+        gaps = []
+        rates = []
         for i, world in enumerate(scenes[name]):
             found = []
             for budget in (*BUDGETS, longest):

@@ -38,13 +38,15 @@ def main() -> None:
         call()
         taken[name].append(1e-3 * (time.thread_time_ns() - began))
 
-    start, times = _world(options.objects), np.linspace(0.0, 20.0, 200)
+    start = _world(options.objects)
+    times = np.linspace(0.0, 20.0, 200)
     poses = np.column_stack([0.2 * times, np.zeros((200, 2))])
     plan = Plan(times, poses, np.full(200, 0.2), np.zeros(200), travel_cost=1.0)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "log.mcap"
         log = McapLog(path)
-        began, cpu = time.perf_counter(), time.process_time() - time.thread_time()
+        began = time.perf_counter()
+        cpu = time.process_time() - time.thread_time()
         for step in range(round(options.rate * options.seconds)):
             now = step / options.rate
             world = start.moved(movable_poses=start.movables.poses + 0.001 * now, time=now)

@@ -82,7 +82,8 @@ def row(policy: str, options: argparse.Namespace) -> str:
     finally:
         robot.terminate()
         robot.join()
-    took, own = 1e3 * np.array(loop.took), 1e3 * np.array(loop.own)
+    took = 1e3 * np.array(loop.took)
+    own = 1e3 * np.array(loop.own)
     cells = [
         policy,
         SUITES[policy],
@@ -105,8 +106,11 @@ class _Loop:
     def __init__(
         self, runner: Runner, pipe: Connection, period: float, killer: Killer, kill: bool
     ) -> None:
-        self.runner, self._pipe, self._period = runner, pipe, period
-        self.killer, self._kill = killer, kill
+        self.runner = runner
+        self._pipe = pipe
+        self._period = period
+        self.killer = killer
+        self._kill = kill
         self.took: list[float] = []
         self.own: list[float] = []
         self.compiled: list[str] = []
@@ -135,14 +139,17 @@ class _Loop:
         number, world = self._pipe.recv()
         self.failures += self.runner.failures
         self.runner.start(world)
-        self._start, self._number = world, number
-        self._offset, self._now = time.perf_counter() - world.time, world.time
+        self._start = world
+        self._number = number
+        self._offset = time.perf_counter() - world.time
+        self._now = world.time
         self._pipe.send(None)
 
     def _receive(self) -> None:
         while True:
             data = self._socket.recv(LARGEST)
-            start, number = self._start, self._number
+            start = self._start
+            number = self._number
             if start is not None and int(np.frombuffer(data, count=1)[0]) == number:
                 world = seen(data, start)
                 self._offset = max(self._offset, time.perf_counter() - world.time - self._period)
@@ -157,7 +164,8 @@ class _Loop:
                 self.reasons[reason] += 1
                 self._begin()
                 due = time.perf_counter()
-            before, own = time.perf_counter(), time.thread_time()
+            before = time.perf_counter()
+            own = time.thread_time()
             # the simulation may fall behind the wall clock, but its clock never goes back
             self._now = max(self._now, before - self._offset)
             command = self.runner.command(self._now)
@@ -184,7 +192,8 @@ class Killer(Stop):
     """A stop rule that ends the thread of the planning call that looks at it next, when told to."""
 
     def __init__(self) -> None:
-        self.due, self.killed = False, 0
+        self.due = False
+        self.killed = 0
 
     def start(self) -> StopCheck:
         """See `pushplan.world.Stop`."""

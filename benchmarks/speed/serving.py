@@ -73,11 +73,15 @@ def compared(address: str, policy: str, world: World, steps: int, whole: bool) -
     made = make_policy(policy)
     made.reset(world, stream(0, "policy"))
     data: dict[str, Any] = world_to_dict(world)
-    poses, own, served = world.movables.poses.tolist(), [], []
+    poses = world.movables.poses.tolist()
+    own = []
+    served = []
     with PolicyClient(address) as client:
         client.reset(data)
         for step in range(steps):
-            now, pose, twist = 0.01 * step, [2.0 + 0.01 * step, 25.0, 0.0], [1.0, 0.0, 0.0]
+            now = 0.01 * step
+            pose = [2.0 + 0.01 * step, 25.0, 0.0]
+            twist = [1.0, 0.0, 0.0]
             began = time.perf_counter()
             made.act(world.moved(robot_pose=pose, robot_twist=twist, time=now), None)
             middle = time.perf_counter()

@@ -58,7 +58,8 @@ def starts(fields: int, seed: int, ice: int, variations: dict[str, float]) -> li
 
 def rate(worlds: list[World], config: ShipLatticeConfig) -> tuple[str, str]:
     """Nodes of exhaustive searches, and how many are expanded in a second of CPU time."""
-    total, seconds = 0, 0.0
+    total = 0
+    seconds = 0.0
     for world in worlds:
         radius = turning_radius(world.robot, config.turn_fraction)
         builder = LatticeBuilder(
@@ -75,10 +76,14 @@ def rate(worlds: list[World], config: ShipLatticeConfig) -> tuple[str, str]:
 
 def call_times(planner: Planner, worlds: list[World]) -> list[str]:
     """First path, whole call, CPU time and nodes; the second call on each world counts."""
-    walls, firsts, cpus, nodes = [], [], [], []
+    walls = []
+    firsts = []
+    cpus = []
+    nodes = []
     for world in worlds:
         for _ in range(2):
-            cpu, wall = time.process_time(), time.perf_counter()
+            cpu = time.process_time()
+            wall = time.perf_counter()
             result = planner.plan(world)
             took = time.process_time() - cpu, time.perf_counter() - wall
         cpus.append(1e3 * took[0])

@@ -91,9 +91,12 @@ def drive(scene: Scene, driver: Served | Theirs, seed: int, most_steps: int, ori
     metric.reset(info)
     world = scene.world()
     driver.begin(world, seed)
-    times, robot = [0.0], [pose_of(scene.body)]
+    times = [0.0]
+    robot = [pose_of(scene.body)]
     objects = [[pose_of(one.body) for one in scene.objects]]
-    waits, reason, done = [], "", False
+    waits = []
+    reason = ""
+    done = False
     while not done:
         began = time.perf_counter()
         action = driver.action(seen, info)

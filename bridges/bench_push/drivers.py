@@ -36,7 +36,8 @@ class Served:
     """
 
     def __init__(self, scene: Scene, address: str) -> None:
-        self._scene, self._client = scene, PolicyClient(address)
+        self._scene = scene
+        self._client = PolicyClient(address)
 
     def begin(self, world: dict, seed: int) -> None:
         """Begin an episode in this world."""
@@ -67,7 +68,8 @@ class Theirs:
     """
 
     def __init__(self, scene: Scene, policy: object) -> None:
-        self._scene, self._policy = scene, policy
+        self._scene = scene
+        self._policy = policy
 
     def begin(self, world: dict, seed: int) -> None:
         """Begin an episode."""

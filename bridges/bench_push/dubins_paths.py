@@ -25,7 +25,10 @@ class DubinsPath:
     """
 
     def __init__(self, start: tuple, radius: float, word: str, lengths: tuple) -> None:
-        self._start, self._radius, self._word, self._lengths = start, radius, word, lengths
+        self._start = start
+        self._radius = radius
+        self._word = word
+        self._lengths = lengths
 
     def path_length(self) -> float:
         """[m]."""
@@ -41,7 +44,8 @@ class DubinsPath:
         x, y, heading = self._start
         left = distance / self._radius
         for kind, length in zip(self._word, self._lengths, strict=True):
-            piece, turn = min(left, length), TURNS[kind]
+            piece = min(left, length)
+            turn = TURNS[kind]
             left -= piece
             if turn:
                 x += self._radius * turn * (sin(heading + turn * piece) - sin(heading))
@@ -55,8 +59,10 @@ class DubinsPath:
 
 def shortest_path(start: tuple, end: tuple, radius: float) -> DubinsPath:
     """The shortest of the six kinds."""
-    dx, dy = end[0] - start[0], end[1] - start[1]
-    along, d = atan2(dy, dx), math.hypot(dx, dy) / radius
+    dx = end[0] - start[0]
+    dy = end[1] - start[1]
+    along = atan2(dy, dx)
+    d = math.hypot(dx, dy) / radius
     found = words(wrapped(start[2] - along), wrapped(end[2] - along), d)
     word = min(found, key=lambda one: sum(found[one]))
     return DubinsPath(tuple(start), radius, word, found[word])
@@ -65,7 +71,11 @@ def shortest_path(start: tuple, end: tuple, radius: float) -> DubinsPath:
 def words(a: float, b: float, d: float) -> dict[str, tuple[float, float, float]]:
     """Lengths of the pieces of every word that exists, from heading a to b over a distance d."""
     found = {}
-    ca, cb, sa, sb, near = cos(a), cos(b), sin(a), sin(b), cos(a - b)
+    ca = cos(a)
+    cb = cos(b)
+    sa = sin(a)
+    sb = sin(b)
+    near = cos(a - b)
     if (square := 2.0 + d * d - 2.0 * near + 2.0 * d * (sa - sb)) >= 0.0:
         tangent = atan2(cb - ca, d + sa - sb)
         found["LSL"] = (wrapped(tangent - a), sqrt(square), wrapped(b - tangent))

@@ -17,10 +17,12 @@ from pushplan.world import MaxIterations
 
 def main() -> None:
     """Solve a file and write the tour in the format of GLNS: its numbers in the eighth line."""
-    file, output = sys.argv[1], sys.argv[2].removeprefix("-output=")
+    file = sys.argv[1]
+    output = sys.argv[2].removeprefix("-output=")
     began = time.perf_counter()
     instance = read_gtsp(file)
-    stop, rng = MaxIterations(20_000), np.random.default_rng(0)
+    stop = MaxIterations(20_000)
+    rng = np.random.default_rng(0)
     tour = solve_gtsp(instance.costs, instance.clusters, stop=stop, rng=rng)
     nodes = [int(node) + 1 for node in tour.nodes]
     lines = [f"Problem Instance : {Path(file).name}", *["-"] * 5, f"Cost : {tour.cost}"]

@@ -40,14 +40,16 @@ def hull(points: object) -> list:
 
 def statics(space: pymunk.Space) -> tuple[list, list]:
     """Polygons and thick segments of everything that stands still, grown by their radius."""
-    polygons, segments = [], []
+    polygons = []
+    segments = []
     for shape in space.shapes:
         label = getattr(shape, "label", "")
         if shape.body.body_type != pymunk.Body.STATIC or label == "receptacle":
             continue
         to_world = shape.body.local_to_world
         if isinstance(shape, pymunk.Segment):
-            a, b = to_world(shape.a), to_world(shape.b)
+            a = to_world(shape.a)
+            b = to_world(shape.b)
             ends = {"from": [float(a.x), float(a.y)], "to": [float(b.x), float(b.y)]}
             segments.append({**ends, "radius": float(shape.radius)})
         else:

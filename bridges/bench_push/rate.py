@@ -24,7 +24,9 @@ def main() -> None:
     scene = SCENES[name][0](variation, images=True)
     rng = np.random.default_rng(0)
     scene.reset(0)
-    steps, spent, over = 0, 0.0, False
+    steps = 0
+    spent = 0.0
+    over = False
     while spent < float(seconds):
         if over:
             scene.reset(steps)

@@ -188,7 +188,8 @@ class Scene:
 class MazeScene(Scene):
     """``maze-NAMO-v0``; variations ``3``, ``5``, ``10``: boxes."""
 
-    name, metric = "maze-NAMO-v0", "maze_namo_metric:MazeNamoMetric"
+    name = "maze-NAMO-v0"
+    metric = "maze_namo_metric:MazeNamoMetric"
     own_limit = "a wall, 400 steps"
     wheels = 4
 
@@ -234,7 +235,8 @@ class MazeScene(Scene):
 class ShipScene(Scene):
     """``ship-ice-v0``; variations ``10`` to ``50``: concentration [%]."""
 
-    name, metric = "ship-ice-v0", "ship_ice_metric:ShipIceMetric"
+    name = "ship-ice-v0"
+    metric = "ship_ice_metric:ShipIceMetric"
     own_limit = "the sides of the channel, 300 steps"
     turns = math.pi / 14.0
 
@@ -279,7 +281,8 @@ class AreaScene(Scene):
     its learned policies have, turn the robot at any rate.
     """
 
-    name, metric = "area-clearing-v0", "task_driven_metric:TaskDrivenMetric"
+    name = "area-clearing-v0"
+    metric = "task_driven_metric:TaskDrivenMetric"
     own_limit = "200 of their steps of 1.5 m since the last box was cleared"
     idle_limit = idle_time(1.5, 0.2)
     turns = math.pi / 60.0  # half of what its attribute says, as its velocity action has it
@@ -345,7 +348,8 @@ class AreaScene(Scene):
 class DeliveryScene(Scene):
     """``box-delivery-v0`` with velocities; variations are the names of its layouts."""
 
-    name, metric = "box-delivery-v0", "task_driven_metric:TaskDrivenMetric"
+    name = "box-delivery-v0"
+    metric = "task_driven_metric:TaskDrivenMetric"
     own_limit = "200 of their steps of 1.25 m since the last box was delivered"
     idle_limit = idle_time(1.25, 0.3)
     turns = 1.0
@@ -383,11 +387,13 @@ class DeliveryScene(Scene):
         return float(self.inner.cfg.agent.mass)
 
     def bounds(self) -> list:
-        x, y = 0.5 * self.inner.room_length, 0.5 * self.inner.room_width
+        x = 0.5 * self.inner.room_length
+        y = 0.5 * self.inner.room_width
         return [-float(x), -float(y), float(x), float(y)]
 
     def goal(self, static: list) -> dict:
-        (x, y), size = self.inner.receptacle_position, self.inner.receptacle_size
+        (x, y) = self.inner.receptacle_position
+        size = self.inner.receptacle_size
         half = 0.5 * float(size)
         corners = [[x - half, y - half], [x + half, y - half], [x + half, y + half]]
         return {"kind": "receptacle", "polygon": convex([*corners, [x - half, y + half]])}

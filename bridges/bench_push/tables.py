@@ -72,7 +72,8 @@ def row(run: Run, base: Run, by: str) -> str:
         cells.append(shown(estimate(list(run.values(f"{by}_{name}").values())), name))
     for name in names:
         if name != "S":
-            mine, other = run.values(f"{by}_{name}"), base.values(f"{by}_{name}")
+            mine = run.values(f"{by}_{name}")
+            other = base.values(f"{by}_{name}")
             gaps = [mine[seed] - other[seed] for seed in sorted(mine.keys() & other.keys())]
             cells.append("" if run is base or not gaps else shown(estimate(gaps), name, "+"))
     if by == "theirs":

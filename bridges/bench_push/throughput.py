@@ -38,7 +38,8 @@ def main() -> None:
     print("| environment | ours [steps/s] | original [steps/s] | ratio, least to most |")
     print("|---|--:|--:|--:|")
     for task, variation, variations in SCENES:
-        ours, theirs = [], []
+        ours = []
+        theirs = []
         for _ in range(options.rounds):
             theirs.append(original(options.python, task, variation, options.seconds))
             ours.append(own(task, variations, options.seconds))
@@ -63,7 +64,9 @@ def own(task: str, variations: dict[str, float], seconds: float) -> float:
     env = PushEnv(task=task, variations=variations, observation="image")
     rng = np.random.default_rng(0)
     env.reset(seed=0)
-    steps, spent, over = 0, 0.0, False
+    steps = 0
+    spent = 0.0
+    over = False
     while spent < seconds:
         if over:
             env.reset(seed=steps)

@@ -55,7 +55,8 @@ def refuse_mixture(checkout: Path, package: Path, installed: str) -> None:
         for file in sorted((checkout / root / "environments").glob("**/config.yaml")):
             place = file.relative_to(checkout / root)
             if (package / place).is_file():
-                theirs, ours = dict(leaves(file)), dict(leaves(package / place))
+                theirs = dict(leaves(file))
+                ours = dict(leaves(package / place))
                 for key in sorted(theirs.keys() | ours.keys()):
                     if theirs.get(key) != ours.get(key):
                         raise SystemExit(

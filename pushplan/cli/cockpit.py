@@ -102,7 +102,8 @@ class Cockpit:
             return
         trace = self._env.trace
         self._board.advance(world, trace.robot_poses, trace.object_poses)
-        lines, begin = self._board.lines(), self._due
+        lines = self._board.lines()
+        begin = self._due
         seconds = (world.time - self._time) / self._speed
         here = np.isin(self._ids, world.movables.ids)
         # a simulator records no more poses than the metrics need, so they are interpolated
@@ -140,7 +141,8 @@ class Cockpit:
 
     def _begin(self, world: World) -> None:
         """Wait for the first key: nobody is ready in the first instant."""
-        self._board, self._time = Scoreboard(world), world.time
+        self._board = Scoreboard(world)
+        self._time = world.time
         self._ids = world.movables.ids
         self._last = np.concatenate([world.robot_pose[None], world.movables.poses])
         self._trail = [world.robot_pose[None, :2]]

@@ -20,11 +20,13 @@ def run(options: argparse.Namespace) -> int:
     wanted = options.names or known()
     with kernel_progress(*wanted) as progress:
         for name in wanted:
-            compiled, loaded = progress.compiled, progress.loaded
+            compiled = progress.compiled
+            loaded = progress.loaded
             begin = time.perf_counter()
             warm_up(name)
             took = time.perf_counter() - begin
             progress.clear()
-            compiled, loaded = progress.compiled - compiled, progress.loaded - loaded
+            compiled = progress.compiled - compiled
+            loaded = progress.loaded - loaded
             say(f"{name}: {took:.1f} s, {compiled} kernels compiled, {loaded} loaded")
     return 0

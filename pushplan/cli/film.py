@@ -84,12 +84,15 @@ class Camera:
         return legend_of(first, plan=predicted or (plans[0][1] if plans else None), trail=True)
 
     def _frames(self, episode: Episode, chosen: list[int]) -> Iterator[Frame]:
-        board, seen, legend = Scoreboard(episode.world), 1, self._legend()
+        board = Scoreboard(episode.world)
+        seen = 1
+        legend = self._legend()
         for index in chosen:
             world, plan = self._steps[index]
             now = int(np.searchsorted(episode.times, world.time + 1e-9))
             board.advance(world, episode.robot_poses[seen:now], episode.object_poses[seen:now])
-            seen, trail = now, episode.robot_poses[:now]
+            seen = now
+            trail = episode.robot_poses[:now]
             text = board.lines()
             if index == chosen[-1]:
                 text = [text[0], "   ".join(closing_lines(episode))]

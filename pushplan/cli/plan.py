@@ -88,7 +88,8 @@ def _print(name: str, result: PlanResult) -> None:
 
 
 def _as_dict(options: argparse.Namespace, label: str, result: PlanResult) -> dict[str, Any]:
-    stats, plan = result.stats, result.plan
+    stats = result.stats
+    plan = result.plan
     data: dict[str, Any] = {
         "schema": SCHEMA,
         "planner": label,

@@ -122,7 +122,8 @@ class _Lines:
     def __call__(self, done: int, total: int, row: ResultRow | None) -> None:
         now = time.monotonic()
         if row is None:
-            self._began, self._there = now, done
+            self._began = now
+            self._there = done
             if done:
                 sys.stderr.write(f"{done} of {total} episodes are there already\n")
             if done < total and self._policies:

@@ -35,7 +35,9 @@ class Scoreboard:
         objects = np.concatenate([self._objects, object_poses[..., :2]])
         self._driven += path_length(robot)
         self._lengths += path_lengths(objects)
-        self._robot, self._objects, self._world = robot[-1:], objects[-1:], world
+        self._robot = robot[-1:]
+        self._objects = objects[-1:]
+        self._world = world
 
     def completed(self) -> BoolArray:
         """(K,) which objects of the start are where they belong; those that left the floor are."""

@@ -34,7 +34,8 @@ class KernelCache(NullCache):
             kernel: the dispatcher.
             form: "inner" or "outer".
         """
-        self._kernel, self._form = kernel, form
+        self._kernel = kernel
+        self._form = form
         self._lock: TextIO | None = None
 
     @property
@@ -117,7 +118,8 @@ class KernelCache(NullCache):
         except OSError:
             return False
         # on a disk without locks two processes may compile the same kernel, and both are right
-        waited, until = False, time.monotonic() + _PATIENCE
+        waited = False
+        until = time.monotonic() + _PATIENCE
         while take_lock(self._lock) is False and time.monotonic() < until:
             waited = True
             time.sleep(_POLL)

@@ -71,7 +71,9 @@ def _parts(function: Any, seen: set[int]) -> Iterator[str]:
     yield function.__qualname__
     yield repr(function.__defaults__)
     names: list[str] = []
-    yield from _code_parts(function.__code__, names)
+    # a docstring is the first constant; it changes no machine code
+    constants = function.__code__.co_consts[function.__doc__ is not None :]
+    yield from _code_parts(function.__code__, constants, names)
     values = [function.__globals__[name] for name in names if name in function.__globals__]
     values += [cell.cell_contents for cell in function.__closure__ or ()]
     ours = [value for value in values if isinstance(value, ModuleType) and _is_ours(value.__name__)]
@@ -80,13 +82,13 @@ def _parts(function: Any, seen: set[int]) -> Iterator[str]:
         yield from _value_parts(value, seen)
 
 
-def _code_parts(code: CodeType, names: list[str]) -> Iterator[str]:
+def _code_parts(code: CodeType, constants: tuple[object, ...], names: list[str]) -> Iterator[str]:
     yield code.co_code.hex()
     yield repr((code.co_varnames, code.co_names))
     names += [name for name in code.co_names if name not in names]
-    for constant in code.co_consts:
+    for constant in constants:
         if isinstance(constant, CodeType):
-            yield from _code_parts(constant, names)
+            yield from _code_parts(constant, constant.co_consts, names)
         elif isinstance(constant, frozenset):
             yield repr(sorted(map(repr, constant)))
         else:

@@ -144,7 +144,8 @@ class InnerCompiler(OuterCompiler):
 
 def reduced(result: Any) -> dict[str, Any]:
     """Take apart what was compiled, to be pickled."""
-    library, description = result.library, result.fndesc
+    library = result.library
+    description = result.fndesc
     description.typemap = description.calltypes = None  # not needed again, large
     inner = isinstance(library, InnerLibrary)
     return {
@@ -168,7 +169,8 @@ def rebuilt(parts: dict[str, Any], context: Any) -> Any:
     """
     for initialise in parts["reload_init"]:
         initialise()
-    description, environment = parts["fndesc"], parts["environment"]
+    description = parts["fndesc"]
+    environment = parts["environment"]
     entry: Any
     library: OuterLibrary
     if parts["bitcode"] is not None:

@@ -84,6 +84,7 @@ class EpisodeClock:
 def _has_moved(before: World, after: World) -> bool:
     if before is after:
         return False
-    one, other = before.movables, after.movables
+    one = before.movables
+    other = after.movables
     same = np.array_equal(before.robot_pose, after.robot_pose)
     return not (same and len(one) == len(other) and np.array_equal(one.poses, other.poses))

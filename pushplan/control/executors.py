@@ -19,7 +19,8 @@ class _Done(Generic[T]):
     """A result that is there from a time on."""
 
     def __init__(self, result: T, ready_at: float) -> None:
-        self._result, self._ready_at = result, ready_at
+        self._result = result
+        self._ready_at = ready_at
 
     def ready(self, time: float) -> bool:
         return time >= self._ready_at - 1e-9
@@ -88,7 +89,8 @@ class SimulatedExecutor:
     takes_time = True
 
     def __init__(self, factor: float, clock: Callable[[], float] = wall.perf_counter) -> None:
-        self._factor, self._clock = number("factor", factor, low=0.0), clock
+        self._factor = number("factor", factor, low=0.0)
+        self._clock = clock
         self._took = ExpectedTime()
         self.spent = 0.0
 

@@ -15,7 +15,8 @@ from pushplan.world.checks import ArrayRecord, FloatArray, array, number
 
 _ASTRAY = math.radians(15.0)
 """Bearing at which a leg is interrupted to turn."""
-_PASSED, _BESIDE = 0.12, 0.03
+_PASSED = 0.12
+_BESIDE = 0.03
 """Distances at which a point that lies behind, or abeam, counts as reached [circumscribed radii]:
 to turn for so little could sweep into something."""
 _SURE = 8.0  # distance from which on the bearing of a point is steered by [`near`]
@@ -89,7 +90,8 @@ class LegFollower:
         response: float = 0.2,
         escapes: int = 0,
     ) -> None:
-        self._robot, self._legs = robot, legs
+        self._robot = robot
+        self._legs = legs
         size = robot.circumscribed_radius
         self._near = 0.02 * size if near is None else number("near", near, low=0.0, open_low=True)
         self._aligned = number("aligned", aligned, low=0.0, open_low=True)
@@ -106,7 +108,8 @@ class LegFollower:
 
     def _take_up(self) -> None:
         """Begin a leg with its turn."""
-        self._turning, self._turned_at = True, math.inf
+        self._turning = True
+        self._turned_at = math.inf
         self._progress.reset()
         self._aiming.reset()
 
@@ -142,7 +145,8 @@ class LegFollower:
         return command
 
     def _drive(self, pose: FloatArray, time: float, seconds: float) -> Twist | None:
-        robot, legs = self._robot, self._legs
+        robot = self._robot
+        legs = self._legs
         while self._next < len(legs.points):
             sign = float(legs.signs[self._next])
             if sign < 0.0 and robot.min_speed == 0.0:

@@ -66,7 +66,8 @@ def ramp_twist(
         angular: wanted turn rate [rad/s].
         period: time for which it is held [s].
     """
-    dv, dw = robot.max_acceleration * period, robot.max_turn_acceleration * period
+    dv = robot.max_acceleration * period
+    dw = robot.max_turn_acceleration * period
     linear = min(max(linear, last.linear - dv), last.linear + dv)
     angular = min(max(angular, last.angular - dw), last.angular + dw)
     return clamp_twist(robot, linear, angular)
@@ -147,7 +148,8 @@ class _AxisLimiter:
             self._input.target_acceleration = [0.0]
 
     def reset(self, velocity: float) -> None:
-        self.velocity, self.acceleration = velocity, 0.0
+        self.velocity = velocity
+        self.acceleration = 0.0
 
     def step(self, wanted: float, period: float) -> float:
         if not math.isfinite(self.limit):
@@ -162,7 +164,8 @@ class _AxisLimiter:
         try:
             self._solver.calculate(self._input, change)
             _, velocity, acceleration = change.at_time(min(period, change.duration))
-            self.velocity, self.acceleration = velocity[0], acceleration[0]
+            self.velocity = velocity[0]
+            self.acceleration = acceleration[0]
         except (ruckig.RuckigError, ValueError):  # limits beyond its numbers
             return self._ramp(wanted, period)
         return self.velocity

@@ -78,7 +78,8 @@ class PathFollower:
         left = math.sin(error) + max(min(0.5 * offset / length, 0.6), -0.6)
         wanted = own - 2.0 * left / length
         if abs(error) > math.pi / 2:
-            left, wanted = error, -math.copysign(math.inf, error)
+            left = error
+            wanted = -math.copysign(math.inf, error)
         if robot.drive is Drive.DIFFERENTIAL:
             if abs(error) > math.pi / 4:
                 turn = self._approach(robot, abs(error))
@@ -89,7 +90,8 @@ class PathFollower:
         if robot.can_stop:
             speed = min(speed, robot.max_turn_rate / max(abs(wanted), 1e-9))
         turn = max(min(speed * wanted, robot.max_turn_rate), -robot.max_turn_rate)
-        back, most = turn - speed * own, self._approach(robot, abs(left))
+        back = turn - speed * own
+        most = self._approach(robot, abs(left))
         return self._limit(Twist(speed, speed * own + max(min(back, most), -most)))
 
     def _approach(self, robot: RobotModel, left: float) -> float:

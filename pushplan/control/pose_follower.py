@@ -23,7 +23,9 @@ class PoseFollower:
     """
 
     def __init__(self, robot: RobotModel, poses: FloatArray, response: float) -> None:
-        self._robot, self._poses, self._response = robot, poses, response
+        self._robot = robot
+        self._poses = poses
+        self._response = response
         self._next = 1
         self._stall = StallChecker(robot)
         self._progress: ProgressChecker | None = None
@@ -36,15 +38,19 @@ class PoseFollower:
             time: [s].
             held: for how long the command will be held [s].
         """
-        robot, size = self._robot, self._robot.circumscribed_radius
+        robot = self._robot
+        size = self._robot.circumscribed_radius
         if self._stall.update(pose, time):
             return None
         seconds = max(held, self._response)
         while self._next < len(self._poses):
-            before, target = self._poses[self._next - 1], self._poses[self._next]
-            c, s = math.cos(float(pose[2])), math.sin(float(pose[2]))
+            before = self._poses[self._next - 1]
+            target = self._poses[self._next]
+            c = math.cos(float(pose[2]))
+            s = math.sin(float(pose[2]))
             dx, dy = (float(value) for value in target[:2] - pose[:2])
-            ahead, aside = c * dx + s * dy, c * dy - s * dx
+            ahead = c * dx + s * dy
+            aside = c * dy - s * dx
             turn = math.remainder(float(target[2] - pose[2]), math.tau)
             moves = float(c * (target[0] - before[0]) + s * (target[1] - before[1]))
             turns = abs(float(target[2] - before[2]))

@@ -25,17 +25,20 @@ class ProgressChecker:
     """
 
     def __init__(self, least: float, patience: float) -> None:
-        self._least, self._patience = least, patience
+        self._least = least
+        self._patience = patience
         self.reset()
 
     def reset(self) -> None:
         """Begin anew, with another thing to do."""
-        self._best, self._since = math.inf, math.inf
+        self._best = math.inf
+        self._since = math.inf
 
     def update(self, left: float, time: float) -> bool:
         """Take what is left to do at a time [s]; returns whether it gets on."""
         if left < self._best - self._least or self._best == math.inf:
-            self._best, self._since = left, time
+            self._best = left
+            self._since = time
         return time - self._since <= self._patience
 
 
@@ -66,7 +69,8 @@ class PoseProgressChecker:
     def update(self, pose: FloatArray, time: float) -> bool:
         """Take the pose (3,) at a time [s]; returns whether the robot gets on."""
         if self._from is None or self._has_moved(pose):
-            self._from, self._since = pose.copy(), time
+            self._from = pose.copy()
+            self._since = time
         self.idle = time - self._since
         return self.idle <= self.patience
 
@@ -88,7 +92,8 @@ class StallChecker:
     """
 
     def __init__(self, robot: RobotModel, patience: float = 0.8) -> None:
-        self._size, self._patience = robot.circumscribed_radius, patience
+        self._size = robot.circumscribed_radius
+        self._patience = patience
         self.reset()
 
     def reset(self) -> None:
@@ -120,7 +125,9 @@ class StallChecker:
         self._command = command
 
     def _begin(self, pose: FloatArray, time: float) -> None:
-        self._from, self._since, self._told = pose.copy(), time, 0.0
+        self._from = pose.copy()
+        self._since = time
+        self._told = 0.0
 
     def _path(self, length: float, turn: float) -> float:
         return abs(length) + self._size * abs(turn)

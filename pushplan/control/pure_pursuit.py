@@ -58,7 +58,8 @@ class PurePursuit:
         if robot.can_stop and along >= progress.total - 1e-9:
             return clamp_twist(robot, 0.0, 0.0)
         aim = progress.pose(min(along + reach, progress.total))
-        dx, dy = float(aim[0]) - x, float(aim[1]) - y
+        dx = float(aim[0]) - x
+        dy = float(aim[1]) - y
         overrun = along + reach - progress.total
         if overrun > 0.0:  # continue the last heading beyond the end
             dx += overrun * math.cos(aim[2])

@@ -14,7 +14,9 @@ from pushplan.motion.recovery_path import recovery_path
 from pushplan.world import Drive, GoalDisc, Movables, StaticMap, Twist, World, box_delivery_robot
 from pushplan.world.checks import FloatArray
 
-_LOOK, _POSES = 0.3, 3  # how far ahead walls are looked for [circumscribed radii], and how often
+# how far ahead walls are looked for [circumscribed radii], and how often
+_LOOK = 0.3
+_POSES = 3
 _DEEPER = 1e-3  # by how much the robot may get deeper into a wall [circumscribed radii]
 
 
@@ -44,7 +46,8 @@ class Recovery:
         looks: bool = True,
     ) -> None:
         self._response = response
-        self._shape, self._walls = footprint(world.robot), obstacles(world.static)
+        self._shape = footprint(world.robot)
+        self._walls = obstacles(world.static)
         self._scratch = np.empty_like(self._shape.vertices)
         self._retreat: Retreat | None = Retreat(
             world.robot, world.robot_pose, distance, skip, self._is_closed if looks else None
@@ -73,7 +76,9 @@ class Recovery:
 
     def _is_closed(self, pose: FloatArray, way: Twist) -> bool:
         """Whether a way leads deeper into what is static than the robot is."""
-        size, here, there = self._shape.radius, np.array(pose), np.empty(3)
+        size = self._shape.radius
+        here = np.array(pose)
+        there = np.empty(3)
         x_min, y_min, x_max, y_max = self._walls.bounds
         seconds = _LOOK * size / (abs(way.linear) + size * abs(way.angular))
         allowed = self._depth(here) + _DEEPER * size

@@ -37,7 +37,8 @@ class Retreat:
         skip: int = 0,
         is_closed: Callable[[FloatArray, Twist], bool] | None = None,
     ) -> None:
-        self._robot, self._distance = robot, distance
+        self._robot = robot
+        self._distance = distance
         self._from = self._tried_from = pose
         self._is_closed = is_closed or (lambda pose, way: False)
         skip %= len(_WAYS)
@@ -60,7 +61,8 @@ class Retreat:
         """
         turned = abs(math.remainder(float(pose[2] - self._from[2]), math.tau))
         if math.dist(pose[:2], self._from[:2]) >= self._distance or turned > _TURNED:
-            self._ways, self.got_away = [], True
+            self._ways = []
+            self.got_away = True
         stopped = bool(self._ways) and self._stall.update(pose, time)
         while self._ways and (stopped or self._is_closed(pose, self._ways[0])):
             self._give_up_way(pose)
@@ -74,7 +76,8 @@ class Retreat:
 
     def _give_up_way(self, pose: FloatArray) -> None:
         """Take the next way; straight back once more if the last one has freed the robot."""
-        size, tried = self._robot.circumscribed_radius, self._ways.pop(0)
+        size = self._robot.circumscribed_radius
+        tried = self._ways.pop(0)
         if math.dist(pose[:2], self._tried_from[:2]) > _FREED * size and self._ways:
             back = clamp_twist(self._robot, -self._robot.max_speed, 0.0)
             if back.linear and tried != back:

@@ -37,7 +37,9 @@ class StageFollower:
         begin: Callable[[], None],
         clock: EpisodeClock,
     ) -> None:
-        self._follow, self._begin, self._clock = follow, begin, clock
+        self._follow = follow
+        self._begin = begin
+        self._clock = clock
         self.reset()
 
     def reset(self) -> None:
@@ -58,14 +60,17 @@ class StageFollower:
         if len(plan.stages) == 1 and plan.stages[0].direction == 1:
             self._take_up(1)
             return self._follow(world, plan)
-        robot, size = world.robot, world.robot.circumscribed_radius
+        robot = world.robot
+        size = world.robot.circumscribed_radius
         if self._progress is None or self._progress.window != _WINDOW * size:
             self._progress = Progress(_WINDOW * size)
         self._progress.update(plan, world.robot_pose)
         stage = self._progress.stage
         if plan is not self._plan or stage != self._stage:
             self._take_up(stage.direction)
-            self._plan, self._stage, self._part = plan, stage, None
+            self._plan = plan
+            self._stage = stage
+            self._part = None
         wanted = self._on_stage(world, plan, stage, self._progress)
         last = self._clock.command
         return ramp_twist(robot, last, wanted.linear, wanted.angular, self._clock.held)
@@ -77,7 +82,8 @@ class StageFollower:
         self._direction = direction
 
     def _on_stage(self, world: World, plan: Plan, stage: Stage, progress: Progress) -> Twist:
-        robot, held = world.robot, self._clock.held
+        robot = world.robot
+        held = self._clock.held
         if stage.direction == 0:
             side = math.copysign(1.0, float(plan.turn_rates[stage.first]))
             left = progress.left_to_turn
@@ -104,9 +110,11 @@ def _part(plan: Plan, stage: Stage) -> Plan:
     poses = plan.poses[part]
     if stage.direction < 0:
         poses = poses + np.array([0.0, 0.0, np.pi])
-    speeds, turn_rates = np.abs(plan.speeds[part]), plan.turn_rates[part].copy()
+    speeds = np.abs(plan.speeds[part])
+    turn_rates = plan.turn_rates[part].copy()
     if len(speeds) > 1:  # what the last pose says belongs to the next stage
-        speeds[-1], turn_rates[-1] = speeds[-2], 0.0
+        speeds[-1] = speeds[-2]
+        turn_rates[-1] = 0.0
     return Plan(
         times=plan.times[part] - plan.times[stage.first],
         poses=poses,

@@ -43,7 +43,8 @@ class Progress:
         """Move on to the place on ``plan`` nearest to a pose (3,); returns `along`."""
         if plan is not self._plan:
             self._plan = plan
-            self._lengths, self._stages = plan.arc_lengths, plan.stages
+            self._lengths = plan.arc_lengths
+            self._stages = plan.stages
             self._at = 0
             self.along = self.turned = 0.0
         while not self._get_on(plan, self.stage, pose) and not self.is_last:
@@ -63,7 +64,8 @@ class Progress:
 
     def _get_on(self, plan: Plan, stage: Stage, pose: FloatArray) -> bool:
         """Take up a pose on a stage; returns whether something of it is left."""
-        x, y = float(pose[0]), float(pose[1])
+        x = float(pose[0])
+        y = float(pose[1])
         if stage.direction:
             self._go_on(plan, stage, x, y)
             return bool(self.along < self._lengths[stage.last] - _NEAR * self.window)
@@ -78,14 +80,16 @@ class Progress:
 
     def _go_on(self, plan: Plan, stage: Stage, x: float, y: float) -> None:
         """Move on to the point of a stage that is driven nearest to (x, y) [m]."""
-        lengths, points = self._lengths, plan.poses[:, :2]
+        lengths = self._lengths
+        points = plan.poses[:, :2]
         first = int(np.searchsorted(lengths, self.along, side="right")) - 1
         first = max(stage.first, first)
         last = int(np.searchsorted(lengths, self.along + self.window)) + 1
         last = min(last, stage.last)
         if last <= first:
             return
-        a, b = points[first:last], points[first + 1 : last + 1]
+        a = points[first:last]
+        b = points[first + 1 : last + 1]
         edge = b - a
         square = np.maximum((edge * edge).sum(axis=1), 1e-18)
         fraction = np.clip((([x, y] - a) * edge).sum(axis=1) / square, 0.0, 1.0)

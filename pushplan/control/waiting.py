@@ -33,15 +33,18 @@ def waiting_twist(world: World) -> Twist:
     robot = world.robot
     if robot.can_stop:
         return Twist(0.0, 0.0)
-    shape, walls = footprint(robot), obstacles(world.static)
-    scratch, at = np.empty_like(shape.vertices), np.empty(3)
+    shape = footprint(robot)
+    walls = obstacles(world.static)
+    scratch = np.empty_like(shape.vertices)
+    at = np.empty(3)
     circle = math.tau * robot.turning_radius
     step = min(_SPACING * shape.radius, circle / 16.0)
 
     def clear(twist: Twist, length: float, ahead: float = 0.0) -> float:
         """How far an arc is clear, up to ``length``, that begins straight ahead of the robot."""
         turn = step * twist.angular / twist.linear
-        first, most = math.ceil(ahead / step), math.ceil((ahead + length) / step)
+        first = math.ceil(ahead / step)
+        most = math.ceil((ahead + length) / step)
         at[:] = world.robot_pose
         return step * _clear_steps(step, turn, first, most, shape, walls, at, scratch) - ahead
 

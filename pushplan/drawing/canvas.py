@@ -35,7 +35,8 @@ class Canvas:
     def __init__(self, bounds: FloatArray, size_px: int, background: Color) -> None:
         sides: list[float] = (bounds[2:] - bounds[:2]).tolist()
         self.scale = SMOOTHING * size_px / max(sides)
-        self.bounds, self.unit = bounds, size_px / NOMINAL_PX
+        self.bounds = bounds
+        self.unit = size_px / NOMINAL_PX
         self.pixels_per_metre = self.scale / SMOOTHING
         # even sides, as video codecs want them
         width, height = (
@@ -76,7 +77,8 @@ class Canvas:
         self, center: FloatArray, radius_m: float, fill: Color, edge: Color, width_px: float = 0.0
     ) -> None:
         """A disc about ``center`` (2,) [m]."""
-        (x, y), r = self.pixels(center[None])[0], radius_m * self.scale
+        (x, y) = self.pixels(center[None])[0]
+        r = radius_m * self.scale
         box = (x - r, y - r, x + r, y + r)
         self.draw.ellipse(box, fill=fill, outline=edge, width=self._width(width_px))
 
@@ -104,7 +106,8 @@ class Canvas:
 
     def thick_segment(self, ends: FloatArray, radius_m: float, color: Color) -> None:
         """A segment (4,) x1, y1, x2, y2 [m] with round ends."""
-        a, b = ends[:2], ends[2:]
+        a = ends[:2]
+        b = ends[2:]
         along = b - a
         length = float(np.hypot(along[0], along[1]))
         if length > 0.0:

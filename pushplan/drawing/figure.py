@@ -39,7 +39,11 @@ STYLE: Any = {
     "pdf.fonttype": 42,
 }
 """Settings of Matplotlib for figures that are printed as they are, one column wide."""
-_LEFT, _RIGHT, _TITLE, _BELOW = 0.55, 0.08, 0.15, 0.4  # around the axes [inch]
+# around the axes [inch]
+_LEFT = 0.55
+_RIGHT = 0.08
+_TITLE = 0.15
+_BELOW = 0.4
 _ENTRY = (1.12, 0.18)  # of the legend: width and height [inch]
 
 
@@ -105,7 +109,8 @@ def draw_figure(*panels: Panel, width_in: float = COLUMN, columns: int | None = 
         for n, (panel, box) in enumerate(zip(panels, boxes, strict=True)):
             row, column = divmod(n, columns)
             top = height - sum(lines[:row]) - row * _BELOW - (row + 1) * above
-            left, low = column * width_in / columns + _LEFT, top - heights[n]
+            left = column * width_in / columns + _LEFT
+            low = top - heights[n]
             place = (left / width_in, low / height, side / width_in, heights[n] / height)
             axes = figure.add_axes(place)
             _draw(axes, panel, box, max(side, heights[n]))
@@ -151,9 +156,11 @@ class _AxesCanvas(Canvas):
     """Axes of Matplotlib, on which one shape is drawn over the other."""
 
     def __init__(self, axes: Any, bounds: FloatArray, inches: float) -> None:
-        self.bounds, self.unit = bounds, 1.0
+        self.bounds = bounds
+        self.unit = 1.0
         self.pixels_per_metre = NOMINAL_PX / float((bounds[2:] - bounds[:2]).max())
-        self._axes, self._order = axes, 1.0
+        self._axes = axes
+        self._order = 1.0
         self._points = 72.0 * inches / NOMINAL_PX  # of a pixel
 
     def polygon(

@@ -41,7 +41,8 @@ def draw_ground(canvas: Canvas, static: StaticMap, goal: Goal, palette: Palette)
     elif isinstance(goal, GoalLine):
         reach = 2.0 * float(np.hypot(*(static.bounds[2:] - static.bounds[:2])))
         along = reach * np.array([-goal.normal[1], goal.normal[0]])
-        a, b = goal.point - along, goal.point + along
+        a = goal.point - along
+        b = goal.point + along
         beyond = reach * goal.normal
         canvas.polygon(np.array([a, b, b + beyond, a + beyond]), fill, fill)
         canvas.line(np.stack([a, b]), edge, 2.5)

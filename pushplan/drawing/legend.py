@@ -53,12 +53,15 @@ def legend_of(
         object_trails: whether those of the objects are.
         pushes: whether numbered pushes are.
     """
-    palette, objects, goal = palette_of(world), world.movables, world.goal
+    palette = palette_of(world)
+    objects = world.movables
+    goal = world.goal
     has_goal = True
     if isinstance(goal, GoalDisc):  # goals of tests may be far away
         nearest = np.clip(goal.center, world.static.bounds[:2], world.static.bounds[2:])
         has_goal = bool(np.hypot(*(goal.center - nearest)) < goal.radius)
-    wheeled, fixed = objects.wheeled & ~objects.fixed, objects.fixed
+    wheeled = objects.wheeled & ~objects.fixed
+    fixed = objects.fixed
     has_walls = bool(len(world.static.polygons) or len(world.static.segments))
     predicted = plan is True or (not isinstance(plan, bool) and bool(pushed(world, plan)))
     entries = {
@@ -93,7 +96,8 @@ def add_strips(
     height, width = picture.shape[:2]
     k = SMOOTHING
     size = max(10, round(min(max(height, width) / 40, width / 24)))
-    font, step = font_of(k * size), round(1.45 * size)
+    font = font_of(k * size)
+    step = round(1.45 * size)
     cells = _cells(entries, font, size, width)
     top = step * len(lines) + size // 2
     rows = 1 + max((row for row, _ in cells), default=-1)
@@ -124,11 +128,14 @@ def add_strips(
 
 def _cells(entries: Sequence[Entry], font: Font, size: int, width: int) -> list[tuple[int, int]]:
     """Row and left edge [px] of each entry, as many in a row as fit."""
-    found, row, x = [], 0, size // 2
+    found = []
+    row = 0
+    x = size // 2
     for entry in entries:
         wide = 3 * size + round(font.getlength(entry.label) / SMOOTHING) + size // 2
         if x + wide > width and x > size // 2:
-            row, x = row + 1, size // 2
+            row = row + 1
+            x = size // 2
         found.append((row, x))
         x += wide
     return found

@@ -17,7 +17,8 @@ from pushplan.world.checks import FloatArray, array, frozen, integer, number
 from pushplan.world.outline import transform
 
 Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
-LONG, LONGEST = 2.5, 1.6
+LONG = 2.5
+LONGEST = 1.6
 """Of a world whose longer side is more than `LONG` times the shorter one, a picture shows
 `LONGEST` times the shorter side by default."""
 SHORT = 6.0
@@ -79,13 +80,16 @@ def draw_moving(
     object_trails: ArrayLike | None,
 ) -> None:
     """Draw robot, objects, plan and paths of `draw_world` over the ground."""
-    palette, objects = palette_of(world), world.movables
+    palette = palette_of(world)
+    objects = world.movables
     if object_trails is not None:
         paths: FloatArray = array("object_trails", object_trails, (None, len(objects), 3))
         for k in range(len(objects)):
             canvas.line(paths[:, k, :2], palette.ghost, 1.5)
     corners = objects.vertices_world
-    reach, (middles, radii) = canvas.bounds, (objects.poses[:, :2], objects.radii[:, None])
+    reach = canvas.bounds
+    middles = objects.poses[:, :2]
+    radii = objects.radii[:, None]
     seen = ((middles + radii > reach[:2]) & (middles - radii < reach[2:])).all(axis=1)
     for k in np.flatnonzero(seen).tolist():
         fill, edge = palette.wheeled if objects.wheeled[k] else palette.box
@@ -108,7 +112,8 @@ def draw_moving(
 def view_bounds(world: World, size_px: int, view: float | None) -> Bounds:
     """What of the world is shown: x_min, y_min, x_max, y_max [m]."""
     box = _with_walls(world.static)
-    low, high = box[:2].copy(), box[2:].copy()
+    low = box[:2].copy()
+    high = box[2:].copy()
     sides = high - low
     axis = int(np.argmax(sides))
     length = float(sides[axis])
@@ -143,7 +148,8 @@ def pushed(world: World, plan: Plan | None) -> list[tuple[FloatArray, FloatArray
     """The objects that a plan expects to move: (N, 3) poses and (V, 2) outline of each."""
     if plan is None or plan.object_poses is None:
         return []
-    objects, poses = world.movables, plan.object_poses
+    objects = world.movables
+    poses = plan.object_poses
     if poses.shape[1] != len(objects):  # planners count fixed objects as static
         objects = world.with_fixed_as_static().movables
     if poses.shape[1] != len(objects):

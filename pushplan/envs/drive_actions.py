@@ -84,7 +84,8 @@ class WaypointAction(_DriveAction):
     def start(self, action: FloatArray, world: World) -> Motion:
         """Drive the shortest way there."""
         target = transform(world.robot_pose, self._half * action[None, :])[0]
-        low, high = world.static.bounds[:2], world.static.bounds[2:]
+        low = world.static.bounds[:2]
+        high = world.static.bounds[2:]
         points = self._way(world, np.clip(target, low, high))
         return _motion(self.robot, points, self._period)
 

@@ -90,7 +90,8 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
     ) -> None:
         task_class: type[Task] = look_up("task", TASKS, task)
         if isinstance(simulator, Simulator):
-            self._simulator, simulator = simulator, simulator.name
+            self._simulator = simulator
+            simulator = simulator.name
         else:
             self._simulator = look_up("simulator", SIMULATORS, simulator)()
         self._may_adapt = action is None
@@ -99,7 +100,8 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         if preset not in task_class.presets:
             raise UnknownNameError(f"preset of {task}", preset, task_class.presets)
         self._renderer = Renderer(render_mode, self._simulator)
-        self.metadata, self.render_mode = self._renderer.metadata, render_mode
+        self.metadata = self._renderer.metadata
+        self.render_mode = render_mode
         variations = {} if variations is None else variations
         self._make_task = partial(task_class, preset=preset, variations=variations)
         self._use_action(action)
@@ -122,7 +124,8 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
     def _use_action(self, name: str) -> None:
         mode: type[ActionMode] = look_up("action", ACTIONS, name)
         self.task: Task = self._make_task(action=name)
-        self._mode, self._mode_name = mode(self.task), name
+        self._mode = mode(self.task)
+        self._mode_name = name
         self.action_space: Any = self._mode.space
 
     def take_velocities(self) -> bool:
@@ -258,10 +261,15 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         steps = [*(waiting(self._meanwhile) for _ in range(int(whole))), motion]
         if rest > 1e-9 * period:
             steps[-1] = waiting(self._meanwhile, rest / period, then=motion)
-        rewards, work, held, traces = 0.0, 0.0, False, []
+        rewards = 0.0
+        work = 0.0
+        held = False
+        traces = []
         for part in steps:
             observation, reward, terminated, truncated, info = self._carry_out(part)
-            rewards, work, held = rewards + reward, work + info["work"], held or info["held"]
+            rewards = rewards + reward
+            work = work + info["work"]
+            held = held or info["held"]
             traces.append(self.trace)
             if terminated or truncated:
                 break
@@ -276,7 +284,9 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
 
     def _carry_out(self, motion: Motion) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
         """Simulate a motion to its end and score it."""
-        before, simulator, roster = self.true_world, self._simulator, self._roster
+        before = self.true_world
+        simulator = self._simulator
+        roster = self._roster
         traces = []
         touched = held = now_held = False
         now = before.time
@@ -295,7 +305,8 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
                     simulator.remove(gone.tolist())
                     roster.drop(gone)
         after = simulator.world()
-        self._world, self._trace = after, Trace.join(traces)
+        self._world = after
+        self._trace = Trace.join(traces)
         work = roster.work(self._trace)
         outcome = self.task.score(before, after, work=work, touched_static=touched)
         if outcome.terminated or outcome.truncated:

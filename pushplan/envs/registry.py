@@ -62,6 +62,7 @@ def default_preset(task: str, simulator: str) -> str:
     Raises:
         UnknownNameError: if there is no such task or simulator.
     """
-    kind, engine = look_up("task", TASKS, task), look_up("simulator", SIMULATORS, simulator)
+    kind = look_up("task", TASKS, task)
+    engine = look_up("simulator", SIMULATORS, simulator)
     presets: tuple[str, ...] = kind.solid_presets if engine.needs_solids else kind.presets
     return presets[0]

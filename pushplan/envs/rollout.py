@@ -40,7 +40,8 @@ class RolloutInteraction:
         """Do as `sweep` for each of several paths; the scene is built once for all of them."""
         simulator = self._simulator
         simulator.build(world, self._materials)
-        start, found = simulator.save(), []
+        start = simulator.save()
+        found = []
         for path in paths:
             simulator.restore(start)
             found.append(simulator.follow(path))

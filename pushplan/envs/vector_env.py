@@ -83,7 +83,8 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
         self.metadata = {**first.metadata, "autoreset_mode": mode}
         self.render_mode = first.render_mode
         first.close()
-        self.num_envs, self.copy = len(env_fns), copy
+        self.num_envs = len(env_fns)
+        self.copy = copy
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         context: Any = multiprocessing.get_context("spawn")
@@ -129,7 +130,8 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
         self, seed: int | Sequence[int | None] | None, options: Mapping[str, Any] | None
     ) -> list[Any]:
         """What each worker needs to reset its environments."""
-        count, given = self.num_envs, dict(options or {})
+        count = self.num_envs
+        given = dict(options or {})
         if seed is None or isinstance(seed, int | np.integer):
             seeds: list[int | None] = [
                 None if seed is None else int(seed) + i for i in range(count)
@@ -311,7 +313,8 @@ def _merged(
         if isinstance(first, Mapping):
             out[key] = _merged([value or {} for value in values], shares, count)
             continue
-        shape, empty = (count, *first.shape[1:]), None if first.dtype == object else 0
+        shape = (count, *first.shape[1:])
+        empty = None if first.dtype == object else 0
         out[key] = np.full(shape, empty, dtype=first.dtype)
         for share, value in zip(shares, values, strict=True):
             if value is not None:

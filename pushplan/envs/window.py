@@ -119,5 +119,7 @@ class Window:
     def close(self) -> None:
         """Close the window; may be called again."""
         if self._root is not None:
-            root, self._root, self._photo = self._root, None, None
+            root = self._root
+            self._root = None
+            self._photo = None
             root.destroy()

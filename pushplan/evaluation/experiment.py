@@ -108,7 +108,8 @@ class Experiment:
         for metric in self.metrics:
             metric_function(metric)
         object.__setattr__(self, "policies", tuple(parse_policies(self.policies)))
-        labels, names = [p.label for p in self.policies], [one.name for one in self.suites]
+        labels = [p.label for p in self.policies]
+        names = [one.name for one in self.suites]
         for name, wanted in self.only.items():
             if name not in names:
                 raise UnknownNameError("suite of this experiment", name, names)
@@ -180,7 +181,8 @@ class Experiment:
             for key in ((row.policy, row.setting), row.policy, None):
                 times.setdefault(key, []).append(row.wall_time_s or 0.0)
         means = {key: float(np.mean(found)) for key, found in times.items()}
-        seconds, most_s = 0.0, None
+        seconds = 0.0
+        most_s = None
         for job in new if means else ():
             label = job.policy.label
             known = ((label, setting_of(*job.key[1:])), label, None)

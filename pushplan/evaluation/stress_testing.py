@@ -164,7 +164,8 @@ def stress(
     """
     rate = number("rate", rate, low=0.0, open_low=True)
     (chosen,) = suites_of(suite, episodes, seed)
-    name, scenarios = chosen.name, chosen.scenarios
+    name = chosen.name
+    scenarios = chosen.scenarios
     if not scenarios:
         raise InvalidInputError("a stress test needs at least one scenario")
     wanted = _conditions(conditions, scenarios)
@@ -223,7 +224,8 @@ def _judged(
     name: str, condition: Condition, rows: Sequence[ResultRow], calm: Mapping[int, ResultRow]
 ) -> StressRow:
     """The outcome of a condition; ``calm`` are the undisturbed episodes by their seeds."""
-    scores, kept = {}, {}
+    scores = {}
+    kept = {}
     for score in metric_names(Role.SCORE):
         pairs = [(getattr(row, score), getattr(calm[row.seed], score)) for row in rows]
         pairs = [pair for pair in pairs if None not in pair]

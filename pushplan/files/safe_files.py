@@ -217,7 +217,8 @@ def _array(file: IO[bytes], limit: int) -> NDArray[Any]:
     if min(shape, default=0) < 0 or size > limit:
         raise SchemaError(f"an array of shape {shape} needs {size:,} bytes, {limit:,} are left")
     values = np.empty(count, kind)
-    room, filled = values.view(np.uint8), 0
+    room = values.view(np.uint8)
+    filled = 0
     while filled < room.size:
         got = file.readinto(room[filled : filled + 2**20])  # type: ignore[attr-defined]
         if not got:
@@ -235,7 +236,8 @@ def _check_json(data: bytes) -> None:
     for strip in (False, True):  # what stands in texts counts only if it must
         text = _TEXT.sub(b'""', data) if strip else data
         count = text.count(b",") + text.count(b"[") + text.count(b"{")
-        depth, digits = 0, 0
+        depth = 0
+        digits = 0
         if count <= MAX_VALUES:
             codes = np.frombuffer(b" %b " % text, dtype=np.uint8)
             steps = _STEPS[codes]

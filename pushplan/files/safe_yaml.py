@@ -19,7 +19,8 @@ LONGEST_NUMBER = 400
 """Most characters of a number in JSON and YAML: floats written out have 310."""
 MAX_NODES = 60_000
 """Most values in a file, each counted as often as aliases repeat it."""
-_WHOLE, _REAL = "tag:yaml.org,2002:int", "tag:yaml.org,2002:float"
+_WHOLE = "tag:yaml.org,2002:int"
+_REAL = "tag:yaml.org,2002:float"
 _TEXTS = ("tag:yaml.org,2002:timestamp", "tag:yaml.org,2002:value")
 """What YAML 1.1 takes for more than a text: dates and ``=``."""
 _NUMBERS = {
@@ -52,7 +53,8 @@ class _Loader(_Safe):
 
     def compose_node(self, parent: Any, index: Any) -> Any:
         event: Any = self.peek_event()
-        before, anchor = self._nodes, event.anchor
+        before = self._nodes
+        anchor = event.anchor
         alias = self.check_event(yaml.AliasEvent)
         if alias and anchor in self.anchors and anchor not in self._sizes:
             raise _refusal(f"the alias {anchor!r:.40} is a part of itself", event)

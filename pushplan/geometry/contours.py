@@ -56,7 +56,8 @@ class _ContourMaker:
     """Makes the contours of one map and clearance in small steps; what is done is kept."""
 
     def __init__(self, static: StaticMap, clearance: float) -> None:
-        self._shapes, diagonal = obstacles_of(static, clearance), _diagonal(static)
+        self._shapes = obstacles_of(static, clearance)
+        diagonal = _diagonal(static)
         small = SMALL_RADIUS * diagonal / np.maximum(self._shapes.radii, 1e-300)
         self._steps = np.minimum(math.pi / 2.0, ARC_STEP * np.sqrt(np.maximum(1.0, small)))
         self._radii = self._shapes.radii + 2.0 * gap_of(static)
@@ -91,7 +92,8 @@ class _ContourMaker:
         outgoing /= np.hypot(outgoing[:, 0], outgoing[:, 1])[:, None]
         incoming = np.empty_like(outgoing)
         incoming[after] = outgoing
-        owner, after = owner.astype(np.int64) + first, after.astype(np.int64) + self._corners
+        owner = owner.astype(np.int64) + first
+        after = after.astype(np.int64) + self._corners
         self._parts.append(Contours(points, incoming, outgoing, owner, after))
         self._corners += len(points)
         self._done = last
@@ -118,14 +120,16 @@ def _outlines(
     """Corners (V, 2) [m] of polygons tangent to the outlines at ``radii`` around convex cores."""
     sizes = np.diff(offsets)
     core = np.repeat(np.arange(len(sizes)), sizes)  # of each corner of the cores
-    after, before = next_corner(offsets), np.arange(-1, len(cores) - 1)
+    after = next_corner(offsets)
+    before = np.arange(-1, len(cores) - 1)
     before[offsets[:-1]] = offsets[1:] - 1
     edges = cores[after] - cores
     normals = np.arctan2(-edges[:, 0], edges[:, 1])  # outward, of the edge that leaves
     turns = (normals - normals[before]) % (2.0 * math.pi)
     turns = np.where(turns > 1.5 * math.pi, 0.0, turns)  # rounding of a straight corner
     points = np.flatnonzero((sizes == 2) & ~edges[offsets[:-1]].any(axis=1))
-    turns[offsets[points]], turns[offsets[points] + 1] = 2.0 * math.pi, 0.0
+    turns[offsets[points]] = 2.0 * math.pi
+    turns[offsets[points] + 1] = 0.0
     counts = np.ceil(turns / steps[core] - 1e-9).astype(np.int64)
     source = np.repeat(np.arange(len(cores)), counts)
     part = (turns / np.maximum(counts, 1))[source]
@@ -141,7 +145,8 @@ def free_points(points: FloatArray, obstacles: Obstacles, box: FloatArray, gap: 
     """Which of the points (N, 2) [m] lie in the box (4,) and ``gap`` or more off every obstacle."""
     keep = np.empty(points.shape[0], dtype=np.bool_)
     for i in range(points.shape[0]):
-        x, y = points[i, 0], points[i, 1]
+        x = points[i, 0]
+        y = points[i, 1]
         inside = box[0] - gap <= x <= box[2] + gap and box[1] - gap <= y <= box[3] + gap
         keep[i] = inside and obstacle_distance(x, y, obstacles) >= gap
     return keep
@@ -153,11 +158,15 @@ def segment_crossings(first: FloatArray, second: FloatArray) -> FloatArray:
     found = np.empty((16, 2))
     count = 0
     for i in range(first.shape[0]):
-        px, py = first[i, 0], first[i, 1]
-        dx, dy = first[i, 2] - px, first[i, 3] - py
+        px = first[i, 0]
+        py = first[i, 1]
+        dx = first[i, 2] - px
+        dy = first[i, 3] - py
         for j in range(second.shape[0]):
-            ax, ay = second[j, 0], second[j, 1]
-            ex, ey = second[j, 2] - ax, second[j, 3] - ay
+            ax = second[j, 0]
+            ay = second[j, 1]
+            ex = second[j, 2] - ax
+            ey = second[j, 3] - ay
             across = dx * ey - dy * ex
             if across == 0.0:
                 continue
@@ -188,7 +197,9 @@ def contour_edges(contours: Contours, which: BoolArray | None = None) -> FloatAr
         contours: the contours.
         which: (V,) flags of the first corners; all of them if None.
     """
-    first, after = contours.corners, contours.following
+    first = contours.corners
+    after = contours.following
     if which is not None:
-        first, after = first[which], after[which]
+        first = first[which]
+        after = after[which]
     return np.ascontiguousarray(np.hstack([first, contours.corners[after]]))

@@ -11,11 +11,14 @@ from pushplan.world.checks import FloatArray
 @kernel
 def _best_edge(a: FloatArray, b: FloatArray) -> tuple[float, float, float]:
     """Outward edge normal of ``a`` along which ``b`` is farthest away: gap [m] and normal."""
-    best, bx, by = -math.inf, 1.0, 0.0
+    best = -math.inf
+    bx = 1.0
+    by = 0.0
     n = a.shape[0]
     for i in range(n):
         j = i + 1 if i + 1 < n else 0
-        nx, ny = a[j, 1] - a[i, 1], a[i, 0] - a[j, 0]
+        nx = a[j, 1] - a[i, 1]
+        ny = a[i, 0] - a[j, 0]
         length = math.sqrt(nx * nx + ny * ny)
         if length == 0.0:
             continue
@@ -26,7 +29,9 @@ def _best_edge(a: FloatArray, b: FloatArray) -> tuple[float, float, float]:
             d = (b[k, 0] - a[i, 0]) * nx + (b[k, 1] - a[i, 1]) * ny
             gap = min(gap, d)
         if gap > best:
-            best, bx, by = gap, nx, ny
+            best = gap
+            bx = nx
+            by = ny
     return best, bx, by
 
 
@@ -56,7 +61,8 @@ def _is_separated_by_edge(a: FloatArray, b: FloatArray) -> bool:
     n = a.shape[0]
     for i in range(n):
         j = i + 1 if i + 1 < n else 0
-        nx, ny = a[j, 1] - a[i, 1], a[i, 0] - a[j, 0]
+        nx = a[j, 1] - a[i, 1]
+        ny = a[i, 0] - a[j, 0]
         if nx == 0.0 and ny == 0.0:
             continue
         outside = True
@@ -80,13 +86,16 @@ def point_segment_distance_sq(
     x: float, y: float, ax: float, ay: float, bx: float, by: float
 ) -> float:
     """Squared distance [m²] of the point x, y to the segment a-b."""
-    dx, dy = bx - ax, by - ay
-    px, py = x - ax, y - ay
+    dx = bx - ax
+    dy = by - ay
+    px = x - ax
+    py = y - ay
     length_sq = dx * dx + dy * dy
     t = 0.0
     if length_sq > 0.0:
         t = min(1.0, max(0.0, (px * dx + py * dy) / length_sq))
-    ex, ey = px - t * dx, py - t * dy
+    ex = px - t * dx
+    ey = py - t * dy
     return ex * ex + ey * ey
 
 

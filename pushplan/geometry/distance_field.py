@@ -27,7 +27,9 @@ def _fill_distances(
     out: FloatArray, origin: FloatArray, step: float, nodes: Nodes, scene: GoalScene, sliver: float
 ) -> None:
     """Write the distance [m] to the goal at the centre of each cell."""
-    obstacles, box, gap = scene.obstacles, scene.box, scene.gap
+    obstacles = scene.obstacles
+    box = scene.box
+    gap = scene.gap
     for i in range(out.shape[0]):
         y = origin[1] + (i + 0.5) * step
         hint = NO_LEG
@@ -65,13 +67,21 @@ def sample_values(
     u = min(max((x - ox) / step, 0.0), float(cols))
     v = min(max((y - oy) / step, 0.0), float(rows))
     own = values[min(int(v), rows - 1), min(int(u), cols - 1)]
-    u, v = max(u - 0.5, 0.0), max(v - 0.5, 0.0)
-    j0, i0 = min(int(u), cols - 1), min(int(v), rows - 1)
-    j1, i1 = min(j0 + 1, cols - 1), min(i0 + 1, rows - 1)
-    a, b, c, d = values[i0, j0], values[i0, j1], values[i1, j0], values[i1, j1]
-    low, high = min(min(a, b), min(c, d)), max(max(a, b), max(c, d))
+    u = max(u - 0.5, 0.0)
+    v = max(v - 0.5, 0.0)
+    j0 = min(int(u), cols - 1)
+    i0 = min(int(v), rows - 1)
+    j1 = min(j0 + 1, cols - 1)
+    i1 = min(i0 + 1, rows - 1)
+    a = values[i0, j0]
+    b = values[i0, j1]
+    c = values[i1, j0]
+    d = values[i1, j1]
+    low = min(min(a, b), min(c, d))
+    high = max(max(a, b), max(c, d))
     if high - low <= 1.5 * step:  # false if one is inf
-        fu, fv = u - j0, v - i0
+        fu = u - j0
+        fv = v - i0
         result = (a * (1.0 - fu) + b * fu) * (1.0 - fv) + (c * (1.0 - fu) + d * fu) * fv
     else:
         result = own if own < math.inf else low
@@ -114,7 +124,8 @@ class GeodesicField:
         which no way leads to the goal stay inf.
         """
         reached = np.isfinite(self.values)
-        static, grid = self.source.static, self.grid
+        static = self.source.static
+        grid = self.grid
         x, y = np.meshgrid(grid.x, grid.y)
         outside = (x > static.bounds[2]) | (y > static.bounds[3])
         blocked = clearance_field(static, grid) - self.source.clearance < self.source.gap

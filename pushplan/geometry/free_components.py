@@ -56,7 +56,8 @@ def object_clearance(
     outline = movables.moved_to(
         np.concatenate([movables.poses[:k], pose[None], movables.poses[k + 1 :]])
     ).outline_world(k)
-    step, rows, cols = grid.resolution, *grid.shape
+    step = grid.resolution
+    rows, cols = grid.shape
     found = np.full(grid.shape, np.inf)
     low = np.floor((outline.min(axis=0) - reach - grid.origin) / step)
     high = np.ceil((outline.max(axis=0) + reach - grid.origin) / step)

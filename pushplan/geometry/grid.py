@@ -92,7 +92,8 @@ def _fill_clearance(
 ) -> None:
     """Write the distance [m] to the nearest obstacle at the centres of cells, row by row."""
     for at in range(first, last):
-        i, j = at // len(x), at % len(x)
+        i = at // len(x)
+        j = at % len(x)
         out[i, j] = obstacle_distance(x[j], y[i], shapes)
 
 
@@ -105,7 +106,8 @@ def clearance_field(
     obstacle in which the cell lies deepest), inf in a map without obstacles. The bounds of the
     map are no obstacle. It is left undone where ``stopped``, asked every few milliseconds, says so.
     """
-    out, shapes = np.empty(grid.shape), obstacles_of(static)
+    out = np.empty(grid.shape)
+    shapes = obstacles_of(static)
     piece = 1 + _PIECE // (1 + len(shapes.radii))
     for first in range(0, out.size, piece):
         if stopped():

@@ -35,7 +35,8 @@ def obstacle_grid(static: StaticMap, clearance: float, margin: float) -> Obstacl
     boxes = obstacles_of(static, clearance).boxes
     if not len(boxes):
         return ObstacleGrid(frozen(np.zeros(2)), 1.0, 0, 0, frozen(np.zeros(1, np.int64)), _NONE)
-    low, high = boxes[:, :2].min(axis=0) - margin, boxes[:, 2:].max(axis=0) + margin
+    low = boxes[:, :2].min(axis=0) - margin
+    high = boxes[:, 2:].max(axis=0) + margin
     extent = np.maximum(high - low, 1e-9 * float((high - low).max()))
     cells = min(_PER_OBSTACLE * len(boxes), _MOST)
     cell = max(math.sqrt(float(extent[0] * extent[1]) / cells), float(extent.max()) / cells)
@@ -56,18 +57,25 @@ def _rows_of(
     k: int, column: int, grid: ObstacleGrid, obstacles: Obstacles, reach: float
 ) -> tuple[int, int]:
     """First and last row of the cells of a column that an obstacle's core comes near to."""
-    first, last = obstacles.offsets[k], obstacles.offsets[k + 1]
+    first = obstacles.offsets[k]
+    last = obstacles.offsets[k + 1]
     left = grid.origin[0] + column * grid.cell - reach
     right = left + grid.cell + 2.0 * reach
-    low, high = math.inf, -math.inf
+    low = math.inf
+    high = -math.inf
     for i in range(first, last):
         j = i + 1 if i + 1 < last else first
-        ax, ay = obstacles.vertices[i, 0], obstacles.vertices[i, 1]
-        dx, dy = obstacles.vertices[j, 0] - ax, obstacles.vertices[j, 1] - ay
-        t0, t1 = 0.0, 1.0
+        ax = obstacles.vertices[i, 0]
+        ay = obstacles.vertices[i, 1]
+        dx = obstacles.vertices[j, 0] - ax
+        dy = obstacles.vertices[j, 1] - ay
+        t0 = 0.0
+        t1 = 1.0
         if abs(dx) > 1e-9 * grid.cell:
-            u, v = (left - ax) / dx, (right - ax) / dx
-            t0, t1 = max(t0, min(u, v)), min(t1, max(u, v))
+            u = (left - ax) / dx
+            v = (right - ax) / dx
+            t0 = max(t0, min(u, v))
+            t1 = min(t1, max(u, v))
         elif ax + max(dx, 0.0) < left or ax + min(dx, 0.0) > right:
             continue
         if t0 <= t1:
@@ -75,23 +83,29 @@ def _rows_of(
             high = max(high, ay + max(t0 * dy, t1 * dy))
     if low > high:
         return 0, -1
-    oy, cell = grid.origin[1], grid.cell
+    oy = grid.origin[1]
+    cell = grid.cell
     return _span((low - reach - oy) / cell, (high + reach - oy) / cell, grid.rows)
 
 
 @kernel(allocates=True)
 def _fill(grid: ObstacleGrid, obstacles: Obstacles, margin: float) -> tuple[IntArray, IntArray]:
     """Lists of obstacles by cell: where each starts, and all of them."""
-    first, boxes = grid.first.copy(), obstacles.boxes
-    items, used = np.empty(0, dtype=np.int64), first[:-1].copy()
+    first = grid.first.copy()
+    boxes = obstacles.boxes
+    items = np.empty(0, dtype=np.int64)
+    used = first[:-1].copy()
     for counting in (True, False):
         if not counting:
             for at in range(first.shape[0] - 1):
                 first[at + 1] += first[at]
-            items, used = np.empty(first[-1], dtype=np.int64), first[:-1].copy()
+            items = np.empty(first[-1], dtype=np.int64)
+            used = first[:-1].copy()
         for k in range(boxes.shape[0]):
-            reach, ox = obstacles.radii[k] + margin, grid.origin[0]
-            low, high = (boxes[k, 0] - margin - ox), (boxes[k, 2] + margin - ox)
+            reach = obstacles.radii[k] + margin
+            ox = grid.origin[0]
+            low = boxes[k, 0] - margin - ox
+            high = boxes[k, 2] + margin - ox
             left, right = _span(low / grid.cell, high / grid.cell, grid.columns)
             for c in range(left, right + 1):
                 bottom, top = _rows_of(k, c, grid, obstacles, reach)
@@ -119,16 +133,25 @@ def sees(
     """`line_of_sight` with a grid."""
     stamp = seen[seen.shape[0] - 1] + 1
     seen[seen.shape[0] - 1] = stamp
-    cell, ox, oy = grid.cell, grid.origin[0], grid.origin[1]
-    u0, v0, u1, v1 = (px - ox) / cell, (py - oy) / cell, (qx - ox) / cell, (qy - oy) / cell
-    left, right = min(u0, u1) - 1e-6, max(u0, u1) + 1e-6
+    cell = grid.cell
+    ox = grid.origin[0]
+    oy = grid.origin[1]
+    u0 = (px - ox) / cell
+    v0 = (py - oy) / cell
+    u1 = (qx - ox) / cell
+    v1 = (qy - oy) / cell
+    left = min(u0, u1) - 1e-6
+    right = max(u0, u1) + 1e-6
     first, last = _span(left, right, grid.columns)
     slope = (v1 - v0) / (u1 - u0) if abs(u1 - u0) > 1e-6 else math.inf
     for c in range(first, last + 1):
-        low, high = min(v0, v1), max(v0, v1)
+        low = min(v0, v1)
+        high = max(v0, v1)
         if slope < math.inf and slope > -math.inf:
-            a, b = v0 + (max(left, c) - u0) * slope, v0 + (min(right, c + 1) - u0) * slope
-            low, high = max(low, min(a, b)), min(high, max(a, b))
+            a = v0 + (max(left, c) - u0) * slope
+            b = v0 + (min(right, c + 1) - u0) * slope
+            low = max(low, min(a, b))
+            high = min(high, max(a, b))
         bottom, top = _span(low, high, grid.rows)
         for r in range(bottom, top + 1):
             at = r * grid.columns + c

@@ -43,10 +43,14 @@ def obstacles_of(static: StaticMap, clearance: float = 0.0) -> Obstacles:
 @kernel
 def core_distance(x: float, y: float, vertices: FloatArray, first: int, last: int) -> float:
     """Signed distance [m] of a point to the core ``vertices[first:last]``, negative inside."""
-    best_sq, inside = math.inf, last - first > 2
+    best_sq = math.inf
+    inside = last - first > 2
     for i in range(first, last):
         j = i + 1 if i + 1 < last else first
-        ax, ay, bx, by = vertices[i, 0], vertices[i, 1], vertices[j, 0], vertices[j, 1]
+        ax = vertices[i, 0]
+        ay = vertices[i, 1]
+        bx = vertices[j, 0]
+        by = vertices[j, 1]
         best_sq = min(best_sq, point_segment_distance_sq(x, y, ax, ay, bx, by))
         if (bx - ax) * (y - ay) - (by - ay) * (x - ax) < 0.0:
             inside = False
@@ -77,8 +81,10 @@ def _segments_closer(
     reach_sq: float,
 ) -> bool:
     """Whether the segments p-q and a-b cross or come closer than the root of ``reach_sq``."""
-    dx, dy = qx - px, qy - py
-    ex, ey = bx - ax, by - ay
+    dx = qx - px
+    dy = qy - py
+    ex = bx - ax
+    ey = by - ay
     sa = dx * (ay - py) - dy * (ax - px)
     sb = dx * (by - py) - dy * (bx - px)
     sp = ex * (py - ay) - ey * (px - ax)
@@ -106,12 +112,16 @@ def crosses_obstacle(
         or min(py, qy) > boxes[k, 3] + margin
     ):
         return False
-    dx, dy = qx - px, qy - py
+    dx = qx - px
+    dy = qy - py
     length = math.sqrt(dx * dx + dy * dy)
     ux, uy = (dx / length, dy / length) if length > 0.0 else (1.0, 0.0)
     reach = max(0.0, radii[k] + margin)
-    first, last = offsets[k], offsets[k + 1]
-    low, high = math.inf, -math.inf  # extent of the core across the line
+    first = offsets[k]
+    last = offsets[k + 1]
+    # extent of the core across the line
+    low = math.inf
+    high = -math.inf
     for i in range(first, last):
         side = ux * (vertices[i, 1] - py) - uy * (vertices[i, 0] - px)
         low = min(low, side)
@@ -122,7 +132,10 @@ def crosses_obstacle(
         return True
     for i in range(first, last):
         j = i + 1 if i + 1 < last else first
-        ax, ay, bx, by = vertices[i, 0], vertices[i, 1], vertices[j, 0], vertices[j, 1]
+        ax = vertices[i, 0]
+        ay = vertices[i, 1]
+        bx = vertices[j, 0]
+        by = vertices[j, 1]
         if _segments_closer(px, py, qx, qy, ax, ay, bx, by, reach * reach):
             return True
     return False

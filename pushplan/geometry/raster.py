@@ -20,7 +20,8 @@ def fill_convex(image: NDArray[Any], vertices_px: FloatArray, value: Any) -> Non
     """Set the pixels whose centres are in a convex polygon of corners (N, 2) x, y [px]."""
     rows, cols = image.shape
     n = vertices_px.shape[0]
-    low, high = math.inf, -math.inf
+    low = math.inf
+    high = -math.inf
     for i in range(n):
         low = min(low, vertices_px[i, 1])
         high = max(high, vertices_px[i, 1])
@@ -30,15 +31,14 @@ def fill_convex(image: NDArray[Any], vertices_px: FloatArray, value: Any) -> Non
     last = min(rows - 1, math.floor(min(high, float(rows)) - 0.5))
     for r in range(first, last + 1):
         y = r + 0.5
-        left, right = math.inf, -math.inf
+        left = math.inf
+        right = -math.inf
         j = n - 1
         for i in range(n):
-            x0, y0, x1, y1 = (
-                vertices_px[j, 0],
-                vertices_px[j, 1],
-                vertices_px[i, 0],
-                vertices_px[i, 1],
-            )
+            x0 = vertices_px[j, 0]
+            y0 = vertices_px[j, 1]
+            x1 = vertices_px[i, 0]
+            y1 = vertices_px[i, 1]
             j = i
             if (y0 < y and y1 < y) or (y0 > y and y1 > y):
                 continue

@@ -66,7 +66,8 @@ def regions_of(target: Target, *, to_center: bool = False) -> Regions:
 
     Those of a clearance area are its open edges, see `outside_area`.
     """
-    discs, lines = np.zeros((0, 3)), np.zeros((0, 4))
+    discs = np.zeros((0, 3))
+    lines = np.zeros((0, 4))
     parts: tuple[FloatArray, ...] = ()
     if isinstance(target, GoalDisc):
         discs = np.array([[*target.center, 0.0 if to_center else target.radius]])
@@ -104,21 +105,28 @@ def _nearest_in_polygon(
 ) -> tuple[float, float]:
     """Nearest point of a convex polygon or segment; the point itself where it is inside."""
     inside = last - first > 2
-    best, bx, by = math.inf, x, y
+    best = math.inf
+    bx = x
+    by = y
     for i in range(first, last):
         j = i + 1 if i + 1 < last else first
-        ax, ay = corners[i, 0], corners[i, 1]
-        dx, dy = corners[j, 0] - ax, corners[j, 1] - ay
+        ax = corners[i, 0]
+        ay = corners[i, 1]
+        dx = corners[j, 0] - ax
+        dy = corners[j, 1] - ay
         if dx * (y - ay) - dy * (x - ax) < 0.0:
             inside = False
         length_sq = dx * dx + dy * dy
         t = 0.0
         if length_sq > 0.0:
             t = min(1.0, max(0.0, ((x - ax) * dx + (y - ay) * dy) / length_sq))
-        qx, qy = ax + t * dx, ay + t * dy
+        qx = ax + t * dx
+        qy = ay + t * dy
         d = (qx - x) ** 2 + (qy - y) ** 2
         if d < best:
-            best, bx, by = d, qx, qy
+            best = d
+            bx = qx
+            by = qy
     if inside:
         return x, y
     return bx, by
@@ -127,9 +135,12 @@ def _nearest_in_polygon(
 @kernel
 def nearest_in_region(k: int, x: float, y: float, regions: Regions) -> tuple[float, float]:
     """Point of region ``k`` that is nearest to x, y [m]: the point itself if it is inside."""
-    discs, lines = regions.discs.shape[0], regions.lines.shape[0]
+    discs = regions.discs.shape[0]
+    lines = regions.lines.shape[0]
     if k < discs:
-        cx, cy, radius = regions.discs[k, 0], regions.discs[k, 1], regions.discs[k, 2]
+        cx = regions.discs[k, 0]
+        cy = regions.discs[k, 1]
+        radius = regions.discs[k, 2]
         distance = math.hypot(x - cx, y - cy)
         if distance <= radius:
             return x, y
@@ -137,12 +148,10 @@ def nearest_in_region(k: int, x: float, y: float, regions: Regions) -> tuple[flo
         return cx + fraction * (x - cx), cy + fraction * (y - cy)
     k -= discs
     if k < lines:
-        px, py, nx, ny = (
-            regions.lines[k, 0],
-            regions.lines[k, 1],
-            regions.lines[k, 2],
-            regions.lines[k, 3],
-        )
+        px = regions.lines[k, 0]
+        py = regions.lines[k, 1]
+        nx = regions.lines[k, 2]
+        ny = regions.lines[k, 3]
         short = (px - x) * nx + (py - y) * ny
         if short <= 0.0:
             return x, y
@@ -160,7 +169,8 @@ def region_crossings(regions: Regions, edges: FloatArray) -> FloatArray:
     found = [np.zeros((0, 2))]
     if len(edges) == 0:
         return found[0]
-    start, along = edges[:, :2], edges[:, 2:] - edges[:, :2]
+    start = edges[:, :2]
+    along = edges[:, 2:] - edges[:, :2]
     for cx, cy, radius in regions.discs.tolist():
         a = np.maximum((along**2).sum(axis=1), 1e-300)
         offset = start - np.array([cx, cy])

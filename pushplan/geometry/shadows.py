@@ -44,19 +44,26 @@ def _outermost(x: float, y: float, corners: FloatArray) -> tuple[int, int]:
     ax = ay = bx = by = 0.0
     for i in range(n):
         j = i + 1 if i + 1 < n else 0
-        dx, dy = corners[i, 0] - x, corners[i, 1] - y
-        ex, ey = corners[j, 0] - x, corners[j, 1] - y
+        dx = corners[i, 0] - x
+        dy = corners[i, 1] - y
+        ex = corners[j, 0] - x
+        ey = corners[j, 1] - y
         side = dx * ey - dy * ex
         if dx * ex + dy * ey < 0.0 and abs(side) <= TOUCH * math.hypot(ex - dx, ey - dy):
             return i, j  # on this side
-        left, right = left or side > 0.0, right or side < 0.0
+        left = left or side > 0.0
+        right = right or side < 0.0
         if dx * dx + dy * dy <= TOUCH * TOUCH:
             shared = True
             continue
         if first < 0 or ax * dy - ay * dx > 0.0:
-            first, ax, ay = i, dx, dy
+            first = i
+            ax = dx
+            ay = dy
         if last < 0 or bx * dy - by * dx < 0.0:
-            last, bx, by = i, dx, dy
+            last = i
+            bx = dx
+            by = dy
     if not shared and not (left and right):
         return -1, -1
     return first, last
@@ -69,11 +76,15 @@ def fill_shadow(mask: Mask, x: float, y: float, corners: FloatArray, value: int)
     first, last = _outermost(x, y, corners)
     if first < 0:
         return
-    ax, ay = corners[first, 0] - x, corners[first, 1] - y
-    bx, by = corners[last, 0] - x, corners[last, 1] - y
+    ax = corners[first, 0] - x
+    ay = corners[first, 1] - y
+    bx = corners[last, 0] - x
+    by = corners[last, 1] - y
     far = 4.0 * (mask.shape[0] + mask.shape[1] + abs(x) + abs(y))
-    a, b = far / math.hypot(ax, ay), far / math.hypot(bx, by)
-    mx, my = ax * a + bx * b, ay * a + by * b
+    a = far / math.hypot(ax, ay)
+    b = far / math.hypot(bx, by)
+    mx = ax * a + bx * b
+    my = ay * a + by * b
     size = math.hypot(mx, my)
     if size < 1e-3 * far:  # seen from one of its sides: the way across it
         across = 0.0
@@ -82,17 +93,24 @@ def fill_shadow(mask: Mask, x: float, y: float, corners: FloatArray, value: int)
             if abs(side) > abs(across):
                 across = side
         turn = 1.0 if across > 0.0 else -1.0
-        mx, my, size = -turn * ay, turn * ax, math.hypot(ax, ay)
+        mx = -turn * ay
+        my = turn * ax
+        size = math.hypot(ax, ay)
     # all corners, then out along one edge of the shadow and back along the other; what lies
     # inside the hull of these does not change which pixels are filled
     hull = np.empty((n + 5, 2))
     for i in range(n + 1):
         k = (first + i) % n
-        hull[i, 0], hull[i, 1] = corners[k, 0], corners[k, 1]
-    hull[n + 1, 0], hull[n + 1, 1] = x + ax * a, y + ay * a
-    hull[n + 2, 0], hull[n + 2, 1] = x + mx * far / size, y + my * far / size
-    hull[n + 3, 0], hull[n + 3, 1] = x + bx * b, y + by * b
-    hull[n + 4, 0], hull[n + 4, 1] = corners[last, 0], corners[last, 1]
+        hull[i, 0] = corners[k, 0]
+        hull[i, 1] = corners[k, 1]
+    hull[n + 1, 0] = x + ax * a
+    hull[n + 1, 1] = y + ay * a
+    hull[n + 2, 0] = x + mx * far / size
+    hull[n + 2, 1] = y + my * far / size
+    hull[n + 3, 0] = x + bx * b
+    hull[n + 3, 1] = y + by * b
+    hull[n + 4, 0] = corners[last, 0]
+    hull[n + 4, 1] = corners[last, 1]
     fill_convex(mask, hull, value)
 
 
@@ -118,7 +136,8 @@ def _fill_table(
 ) -> None:
     """Distance of each cell to each bend, over the bends that the cell sees."""
     rows, cols, count = table.shape
-    spots, eyes = np.empty_like(loops), np.empty_like(bends.corners)
+    spots = np.empty_like(loops)
+    eyes = np.empty_like(bends.corners)
     for axis in range(2):
         spots[:, axis] = (loops[:, axis] - origin[axis]) / step
         eyes[:, axis] = (bends.corners[:, axis] - origin[axis]) / step
@@ -150,16 +169,19 @@ def _bends_in_sight(
     """Corners that x, y sees along a tangent, and their distances [m]."""
     clearance = obstacle_distance(x, y, obstacles)
     count = bends.corners.shape[0]
-    found, lengths = np.empty(count, dtype=np.int64), np.empty(count)
+    found = np.empty(count, dtype=np.int64)
+    lengths = np.empty(count)
     n = 0
     for k in range(count):
-        qx, qy = bends.corners[k, 0], bends.corners[k, 1]
+        qx = bends.corners[k, 0]
+        qy = bends.corners[k, 1]
         if clearance > sliver and not is_tangent(
             x - qx, y - qy, bends.incoming, bends.outgoing, k, gap
         ):
             continue
         if line_of_sight(x, y, qx, qy, obstacles, gap):
-            found[n], lengths[n] = k, math.hypot(x - qx, y - qy)
+            found[n] = k
+            lengths[n] = math.hypot(x - qx, y - qy)
             n += 1
     return found[:n], lengths[:n]
 

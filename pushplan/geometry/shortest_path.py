@@ -72,7 +72,8 @@ class _Graph(NamedTuple):
 
 @lru_cache(maxsize=32)
 def _graph_of(static: StaticMap, clearance: float) -> _Graph:
-    shapes, gap = obstacles_of(static, clearance), gap_of(static)
+    shapes = obstacles_of(static, clearance)
+    gap = gap_of(static)
     every = contours_of(static, clearance)
     keep = free_points(owned(every.corners), shapes, static.bounds, gap)
     kept = Contours(*(frozen(np.ascontiguousarray(values[keep])) for values in every))
@@ -177,7 +178,8 @@ class GoalDistances:
         points = [start]
         while node != GOAL_LEG:
             points.append(self.nodes.points[node])
-            last, node = node, int(self.parents[node])
+            last = node
+            node = int(self.parents[node])
         if (self.exits[last] != self.nodes.points[last]).any():
             points.append(self.exits[last])
         return over, points
@@ -188,7 +190,8 @@ def _distances(
     static: StaticMap, clearance: float, target: Target, to_center: bool
 ) -> GoalDistances:
     regions = regions_of(target, to_center=to_center)
-    graph, shapes = _graph_of(static, clearance), obstacles_of(static, clearance)
+    graph = _graph_of(static, clearance)
+    shapes = obstacles_of(static, clearance)
     gap = gap_of(static)
     ends = ends_on_rims(static, clearance, regions)
     corners = graph.contours
@@ -201,7 +204,8 @@ def _distances(
         corners.corners, scene._replace(regions=Regions(*map(frozen, (discs, *none))))
     )
     legs = np.where((rims[:, 0] < legs[:, 0])[:, None], rims, legs)
-    distances, parents = legs[:, 0].copy(), np.full(count, GOAL_LEG, dtype=np.int64)
+    distances = legs[:, 0].copy()
+    parents = np.full(count, GOAL_LEG, dtype=np.int64)
     relax(distances, parents, graph.starts, graph.ends, graph.lengths)
     zeros = np.zeros((len(ends), 2))
     distances = np.concatenate([distances, np.zeros(len(ends))])
@@ -224,7 +228,8 @@ def _distances(
 
 def ends_on_rims(static: StaticMap, clearance: float, regions: Regions) -> FloatArray:
     """Where a path may end at the rim (N, 2) [m] of what covers a part of the goal."""
-    shapes, contours = obstacles_of(static, clearance), contours_of(static, clearance)
+    shapes = obstacles_of(static, clearance)
+    contours = contours_of(static, clearance)
     which = None
     if not len(regions.lines):  # only obstacles near it can cover a part of it
         around = np.concatenate([regions.discs[:, :2], regions.corners])
@@ -270,7 +275,8 @@ def leave_inflation(static: StaticMap, clearance: float, point: FloatArray) -> F
     """
     x, y = point.tolist()
     gap = gap_of(static)
-    raw, grown = obstacles_of(static), obstacles_of(static, clearance)
+    raw = obstacles_of(static)
+    grown = obstacles_of(static, clearance)
     if obstacle_distance(x, y, raw) < -gap:
         return None
     if obstacle_distance(x, y, grown) >= gap:
@@ -298,7 +304,8 @@ def _ways_out(static: StaticMap, clearance: float, near: IntArray) -> FloatArray
     """Where outlines of the obstacles ``near`` cross each other or the bounds, (N, 2) [m]."""
     contours = contours_of(static, clearance)
     which = np.isin(contours.owner, near)
-    edges, owner = contour_edges(contours, which), contours.owner[which]
+    edges = contour_edges(contours, which)
+    owner = contours.owner[which]
     found = [segment_crossings(box_edges(static.bounds), edges)]
     found += [segment_crossings(edges[owner == k], edges[owner > k]) for k in near.tolist()]
     return np.ascontiguousarray(np.concatenate(found))

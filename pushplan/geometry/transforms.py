@@ -13,9 +13,12 @@ from pushplan.world.checks import FloatArray, IntArray
 @kernel
 def transform_points(pose: FloatArray, points_body: FloatArray, out: FloatArray) -> None:
     """Carry (N, 2) points from the frame of a body at ``pose`` (3,) to the world, into ``out``."""
-    c, s = np.cos(pose[2]), np.sin(pose[2])
+    c = np.cos(pose[2])
+    s = np.sin(pose[2])
     for i in range(points_body.shape[0]):
-        x, y = points_body[i, 0], points_body[i, 1]  # ``out`` may be ``points_body`` itself
+        # ``out`` may be ``points_body`` itself
+        x = points_body[i, 0]
+        y = points_body[i, 1]
         out[i, 0] = pose[0] + c * x - s * y
         out[i, 1] = pose[1] + s * x + c * y
 
@@ -26,7 +29,8 @@ def transform_outlines(
 ) -> None:
     """Carry flattened outlines (V, 2) of K bodies from their frames to the world, into ``out``."""
     for k in range(poses.shape[0]):
-        a, b = offsets[k], offsets[k + 1]
+        a = offsets[k]
+        b = offsets[k + 1]
         transform_points(poses[k], vertices[a:b], out[a:b])
 
 

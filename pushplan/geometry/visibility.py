@@ -62,7 +62,8 @@ def visible_pairs(
     count = 0
     for i in range(points.shape[0]):
         for j in range(i + 1, points.shape[0]):
-            dx, dy = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1]
+            dx = points[j, 0] - points[i, 0]
+            dy = points[j, 1] - points[i, 1]
             if not (
                 is_tangent(dx, dy, incoming, outgoing, i, gap)
                 and is_tangent(-dx, -dy, incoming, outgoing, j, gap)
@@ -77,7 +78,8 @@ def visible_pairs(
                 more_lengths = np.empty(2 * count)
                 copy_into(more_pairs[:count], pairs)
                 copy_into(more_lengths[:count], lengths)
-                pairs, lengths = more_pairs, more_lengths
+                pairs = more_pairs
+                lengths = more_lengths
             pairs[count, 0] = i
             pairs[count, 1] = j
             lengths[count] = math.hypot(dx, dy)
@@ -92,10 +94,12 @@ def relax(
     """Dijkstra's algorithm from given first distances (V,) [m], in place."""
     done = np.zeros(distances.shape[0], dtype=np.bool_)
     for _ in range(distances.shape[0]):
-        node, best = -1, math.inf
+        node = -1
+        best = math.inf
         for i in range(distances.shape[0]):
             if not done[i] and distances[i] < best:
-                node, best = i, distances[i]
+                node = i
+                best = distances[i]
         if node < 0:
             return
         done[node] = True
@@ -110,7 +114,9 @@ def relax(
 def goal_leg(x: float, y: float, scene: GoalScene) -> tuple[float, float, float]:
     """The straight way from x, y to the nearest visible region: length [m] (inf) and its end."""
     regions, obstacles, box, gap = scene
-    best, bx, by = math.inf, x, y
+    best = math.inf
+    bx = x
+    by = y
     count = regions.discs.shape[0] + regions.lines.shape[0] + regions.offsets.shape[0] - 1
     for k in range(count):
         qx, qy = nearest_in_region(k, x, y, regions)
@@ -121,7 +127,9 @@ def goal_leg(x: float, y: float, scene: GoalScene) -> tuple[float, float, float]
             and box[1] - gap <= qy <= box[3] + gap
             and line_of_sight(x, y, qx, qy, obstacles, gap)
         ):
-            best, bx, by = length, qx, qy
+            best = length
+            bx = qx
+            by = qy
     return best, bx, by
 
 
@@ -137,7 +145,8 @@ def node_leg(
     gap: float,  # distance to keep from obstacles [m]
 ) -> tuple[float, int]:
     """The best node to walk to from x, y: distance to the goal over it [m] and its index."""
-    best, found = limit, NO_LEG
+    best = limit
+    found = NO_LEG
     count = nodes.points.shape[0]
     for trial in range(-1, count):
         i = trial
@@ -147,7 +156,8 @@ def node_leg(
             i = hint
         elif nodes.distances[i] >= best:
             break
-        dx, dy = x - nodes.points[i, 0], y - nodes.points[i, 1]
+        dx = x - nodes.points[i, 0]
+        dy = y - nodes.points[i, 1]
         left = best - nodes.distances[i]
         if dx * dx + dy * dy >= left * left or left <= 0.0:
             continue
@@ -157,5 +167,6 @@ def node_leg(
         if length < best and line_of_sight(
             x, y, nodes.points[i, 0], nodes.points[i, 1], obstacles, gap
         ):
-            best, found = length, i
+            best = length
+            found = i
     return best, found

@@ -109,7 +109,8 @@ class VisibilityGraph:
 def _corners_of(static: StaticMap, clearance: float) -> Corners:
     """The corners of all contours, without ends."""
     contours = contours_of(static, clearance)
-    points, count = contours.corners, len(obstacles_of(static, clearance).radii)
+    points = contours.corners
+    count = len(obstacles_of(static, clearance).radii)
     first = np.searchsorted(contours.owner, np.arange(count + 1)).astype(np.int64)
     low = np.minimum.reduceat(points, first[:-1]) if count else points
     high = np.maximum.reduceat(points, first[:-1]) if count else points
@@ -124,8 +125,10 @@ def _visibility_search(
     static: StaticMap, clearance: float, target: Target, start: FloatArray
 ) -> VisibilitySearch:
     """A search that knows nothing yet but the map and where it begins and ends."""
-    regions, gap = regions_of(target), gap_of(static)
-    shapes, corners = obstacles_of(static, clearance), _corners_of(static, clearance)
+    regions = regions_of(target)
+    gap = gap_of(static)
+    shapes = obstacles_of(static, clearance)
+    corners = _corners_of(static, clearance)
     ends = ends_on_rims(static, clearance, regions)
     points = np.concatenate([corners.points, ends])
     scene = GoalScene(regions, shapes, static.bounds, gap)

@@ -25,11 +25,16 @@ from pushplan.geometry.visibility import GoalScene, is_tangent
 from pushplan.search.heap import pop_least, push_or_lift
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
-FOUND, EXHAUSTED, PAUSED, FULL = 0, 1, 2, 3
+FOUND = 0
+EXHAUSTED = 1
+PAUSED = 2
+FULL = 3
 """What `search` returns: there, no path exists, its budget is used up, more memory is needed."""
 START = -1
 """Index of the start among the nodes."""
-_USED, _TESTED, _END = 1, 2, 3
+_USED = 1
+_TESTED = 2
+_END = 3
 
 
 class Corners(NamedTuple):
@@ -78,7 +83,8 @@ class VisibilitySearch(NamedTuple):
 @kernel
 def _bound(x: float, y: float, scene: GoalScene) -> float:
     """Straight distance [m] to the goal."""
-    best, regions = math.inf, scene.regions
+    best = math.inf
+    regions = scene.regions
     count = regions.discs.shape[0] + regions.lines.shape[0] + regions.offsets.shape[0] - 1
     for k in range(count):
         qx, qy = nearest_in_region(k, x, y, regions)
@@ -100,8 +106,12 @@ def bounds_by_obstacle(corners: Corners, scene: GoalScene) -> FloatArray:
 def exit_leg(x: float, y: float, search: VisibilitySearch) -> tuple[float, float, float]:
     """The straight way to the nearest region that can be seen: length [m] (inf) and its end."""
     scene = search.scene
-    regions, box, gap = scene.regions, scene.box, scene.gap
-    best, bx, by = math.inf, x, y
+    regions = scene.regions
+    box = scene.box
+    gap = scene.gap
+    best = math.inf
+    bx = x
+    by = y
     count = regions.discs.shape[0] + regions.lines.shape[0] + regions.offsets.shape[0] - 1
     for k in range(count):
         qx, qy = nearest_in_region(k, x, y, regions)
@@ -112,7 +122,9 @@ def exit_leg(x: float, y: float, search: VisibilitySearch) -> tuple[float, float
             and box[1] - gap <= qy <= box[3] + gap
             and sees(x, y, qx, qy, scene.obstacles, gap, search.grid, search.seen)
         ):
-            best, bx, by = length, qx, qy
+            best = length
+            bx = qx
+            by = qy
     return best, bx, by
 
 
@@ -128,9 +140,13 @@ def _offer(
     """Put a way of getting to a node into the heap."""
     entry = search.counters[_USED]
     search.counters[_USED] = entry + 1
-    frontier.lengths[entry], frontier.nodes[entry] = length, node
-    frontier.before[entry], frontier.places[entry] = before, -1
-    keys, heap, places = frontier.keys, frontier.heap, frontier.places
+    frontier.lengths[entry] = length
+    frontier.nodes[entry] = node
+    frontier.before[entry] = before
+    frontier.places[entry] = -1
+    keys = frontier.keys
+    heap = frontier.heap
+    places = frontier.places
     push_or_lift(keys, heap, places, search.counters, entry, length + bound)
 
 
@@ -143,35 +159,51 @@ def expand(
     Only corners through which the goal is farther than ``low`` [m], -inf at first, and not much
     farther; an entry stands for the rest.
     """
-    corners, scene, gap = search.corners, search.scene, search.scene.gap
-    count, box, point = corners.owner.shape[0], scene.box, corners.points
-    x, y, own = search.start[0], search.start[1], -1
+    corners = search.corners
+    scene = search.scene
+    gap = search.scene.gap
+    count = corners.owner.shape[0]
+    box = scene.box
+    point = corners.points
+    x = search.start[0]
+    y = search.start[1]
+    own = -1
     ix = iy = ox = oy = 0.0
     if at >= 0:
-        x, y, own = point[at, 0], point[at, 1], corners.owner[at]
-        ix, iy = corners.incoming[at, 0], corners.incoming[at, 1]
-        ox, oy = corners.outgoing[at, 0], corners.outgoing[at, 1]
+        x = point[at, 0]
+        y = point[at, 1]
+        own = corners.owner[at]
+        ix = corners.incoming[at, 0]
+        iy = corners.incoming[at, 1]
+        ox = corners.outgoing[at, 0]
+        oy = corners.outgoing[at, 1]
     straight = _bound(x, y, scene)
-    high, rest = straight + 2.0 * (low - straight), False
+    high = straight + 2.0 * (low - straight)
+    rest = False
     if low == -math.inf:
         high = straight + search.grid.cell
         leg, _, _ = exit_leg(x, y, search)
         if leg < math.inf:
             _offer(search, frontier, point.shape[0], length + leg, 0.0, at)
         for j in range(count, point.shape[0]):
-            dx, dy = point[j, 0] - x, point[j, 1] - y
+            dx = point[j, 0] - x
+            dy = point[j, 1] - y
             if at < 0 or is_tangent(dx, dy, corners.incoming, corners.outgoing, at, gap):
                 _offer(search, frontier, j, length + math.hypot(dx, dy), 0.0, at)
     obstacles = scene.obstacles
     for k in range(corners.middles.shape[0]):
-        mx, my = corners.middles[k, 0] - x, corners.middles[k, 1] - y
-        hx, hy = corners.halves[k, 0], corners.halves[k, 1]
-        ax, ay = max(abs(mx) - hx, 0.0), max(abs(my) - hy, 0.0)
+        mx = corners.middles[k, 0] - x
+        my = corners.middles[k, 1] - y
+        hx = corners.halves[k, 0]
+        hy = corners.halves[k, 1]
+        ax = max(abs(mx) - hx, 0.0)
+        ay = max(abs(my) - hy, 0.0)
         away = high - search.left[k]  # farther than that the goal is too far from its corners
         if away < 0.0 or ax * ax + ay * ay > away * away:
             rest = True
             continue
-        first, last = corners.first[k], corners.first[k + 1]
+        first = corners.first[k]
+        last = corners.first[k + 1]
         every = k == own
         if at < 0:
             away = core_distance(
@@ -179,22 +211,27 @@ def expand(
             )
             every = away - obstacles.radii[k] <= search.sliver
         elif not every:  # the box around it must reach into where tangents at this corner lead
-            before, after = ix * my - iy * mx, ox * my - oy * mx
-            b, a = abs(ix) * hy + abs(iy) * hx + gap, abs(ox) * hy + abs(oy) * hx + gap
+            before = ix * my - iy * mx
+            after = ox * my - oy * mx
+            b = abs(ix) * hy + abs(iy) * hx + gap
+            a = abs(ox) * hy + abs(oy) * hx + gap
             if not ((before >= -b and after <= a) or (before <= b and after >= -a)):
                 continue
         for j in range(first, last):
             if search.done[j]:
                 continue
-            px, py = point[j, 0], point[j, 1]
+            px = point[j, 0]
+            py = point[j, 1]
             if not (box[0] - gap <= px <= box[2] + gap and box[1] - gap <= py <= box[3] + gap):
                 continue
-            dx, dy = px - x, py - y
+            dx = px - x
+            dy = py - y
             if not every and not is_tangent(-dx, -dy, corners.incoming, corners.outgoing, j, gap):
                 continue
             if at >= 0 and not is_tangent(dx, dy, corners.incoming, corners.outgoing, at, gap):
                 continue
-            step, bound = math.hypot(dx, dy), _bound(px, py, scene)
+            step = math.hypot(dx, dy)
+            bound = _bound(px, py, scene)
             if step + bound > high:
                 rest = True
             elif step + bound > low:
@@ -207,15 +244,19 @@ def expand(
 @kernel
 def search_on(search: VisibilitySearch, frontier: Frontier, budget: int) -> int:
     """Take up the search for about ``budget`` corners looked at, or lines tested."""
-    corners, scene, counters = search.corners, search.scene, search.counters
-    most, count = corners.points.shape[0] + 2, corners.owner.shape[0]
+    corners = search.corners
+    scene = search.scene
+    counters = search.counters
+    most = corners.points.shape[0] + 2
+    count = corners.owner.shape[0]
     while budget > 0:
         if counters[0] == 0:
             return EXHAUSTED
         if counters[_USED] + most > frontier.nodes.shape[0]:
             return FULL
         entry = pop_least(frontier.keys, frontier.heap, frontier.places, counters)
-        node, before = frontier.nodes[entry], frontier.before[entry]
+        node = frontier.nodes[entry]
+        before = frontier.before[entry]
         budget -= 1
         if node == corners.points.shape[0]:  # its line has been tested
             counters[_END] = before
@@ -226,15 +267,19 @@ def search_on(search: VisibilitySearch, frontier: Frontier, budget: int) -> int:
             continue
         if search.done[node]:
             continue
-        x, y = search.start[0], search.start[1]
+        x = search.start[0]
+        y = search.start[1]
         if before >= 0:
-            x, y = corners.points[before, 0], corners.points[before, 1]
+            x = corners.points[before, 0]
+            y = corners.points[before, 1]
         counters[_TESTED] += 1
         budget -= 8
-        qx, qy = corners.points[node, 0], corners.points[node, 1]
+        qx = corners.points[node, 0]
+        qy = corners.points[node, 1]
         if not sees(x, y, qx, qy, scene.obstacles, scene.gap, search.grid, search.seen):
             continue
-        search.done[node], search.parents[node] = True, before
+        search.done[node] = True
+        search.parents[node] = before
         if node >= count:
             counters[_END] = node
             return FOUND
@@ -252,8 +297,10 @@ def new_frontier(capacity: int) -> Frontier:
 
 def path_found(search: VisibilitySearch) -> tuple[float, list[FloatArray]]:
     """Length [m] and points (2,) [m] of the path that a search has found, from its start."""
-    points, at = search.corners.points, int(search.counters[_END])
-    total, path = 0.0, []
+    points = search.corners.points
+    at = int(search.counters[_END])
+    total = 0.0
+    path = []
     if at < len(search.corners.owner):  # it goes on into the goal
         x, y = (search.start if at == START else points[at]).tolist()
         total, qx, qy = exit_leg(x, y, search)

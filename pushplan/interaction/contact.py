@@ -14,10 +14,12 @@ BELOW_ZERO = -5e-324
 @kernel
 def least_overlap(a: FloatArray, b: FloatArray) -> tuple[float, int]:
     """Widest signed gap [m] of ``b`` along an edge normal of ``a``, and the corner it begins at."""
-    best, edge = -np.inf, 0
+    best = -np.inf
+    edge = 0
     for i in range(a.shape[0]):
         j = i + 1 if i + 1 < a.shape[0] else 0
-        nx, ny = a[j, 1] - a[i, 1], a[i, 0] - a[j, 0]
+        nx = a[j, 1] - a[i, 1]
+        ny = a[i, 0] - a[j, 0]
         scale = 1.0 / np.sqrt(nx * nx + ny * ny)
         nx *= scale
         ny *= scale
@@ -27,7 +29,8 @@ def least_overlap(a: FloatArray, b: FloatArray) -> tuple[float, int]:
             if d < gap:
                 gap = d
         if gap > best:
-            best, edge = gap, i
+            best = gap
+            edge = i
             if best > 0.0:
                 break
     return best, edge
@@ -64,23 +67,38 @@ def clip_facing(
 ) -> int:
     """Clip the edge that faces the reference edge against it; returns the number of points."""
     after = edge + 1 if edge + 1 < ref.shape[0] else 0
-    px, py = ref[edge, 0], ref[edge, 1]
-    tx, ty = ref[after, 0] - px, ref[after, 1] - py
+    px = ref[edge, 0]
+    py = ref[edge, 1]
+    tx = ref[after, 0] - px
+    ty = ref[after, 1] - py
     length = np.sqrt(tx * tx + ty * ty)
-    tx, ty = tx / length, ty / length
-    nx, ny = ty, -tx
-    side, other, facing = 0, 0, np.inf
+    tx = tx / length
+    ty = ty / length
+    nx = ty
+    ny = -tx
+    side = 0
+    other = 0
+    facing = np.inf
     for i in range(inc.shape[0]):
         j = i + 1 if i + 1 < inc.shape[0] else 0
-        ex, ey = inc[j, 1] - inc[i, 1], inc[i, 0] - inc[j, 0]
+        ex = inc[j, 1] - inc[i, 1]
+        ey = inc[i, 0] - inc[j, 0]
         d = (ex * nx + ey * ny) / np.sqrt(ex * ex + ey * ey)
         if d < facing:
-            facing, side, other = d, i, j
+            facing = d
+            side = i
+            other = j
     # the ends of the facing edge along the reference edge and along its normal
-    ux, uy, wx, wy = inc[side, 0] - px, inc[side, 1] - py, inc[other, 0] - px, inc[other, 1] - py
-    su, sw = ux * tx + uy * ty, wx * tx + wy * ty
-    du, dw = ux * nx + uy * ny, wx * nx + wy * ny
-    found, span = 0, sw - su
+    ux = inc[side, 0] - px
+    uy = inc[side, 1] - py
+    wx = inc[other, 0] - px
+    wy = inc[other, 1] - py
+    su = ux * tx + uy * ty
+    sw = wx * tx + wy * ty
+    du = ux * nx + uy * ny
+    dw = wx * nx + wy * ny
+    found = 0
+    span = sw - su
     for end in range(2):
         s, d = (su, du) if end == 0 else (sw, dw)
         clipped = min(max(s, 0.0), length)

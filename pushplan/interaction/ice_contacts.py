@@ -22,11 +22,13 @@ from pushplan.world.checks import FloatArray
 @kernel
 def _widest_gap(a: FloatArray, b: FloatArray, enough: float) -> tuple[float, int]:
     """Greatest gap from an edge of ``a`` to ``b`` and that edge; stops at one beyond ``enough``."""
-    best, edge = -np.inf, 0
+    best = -np.inf
+    edge = 0
     count = a.shape[0]
     for i in range(count):
         j = i + 1 if i + 1 < count else 0
-        nx, ny = a[j, 1] - a[i, 1], a[i, 0] - a[j, 0]
+        nx = a[j, 1] - a[i, 1]
+        ny = a[i, 0] - a[j, 0]
         scale = 1.0 / np.sqrt(nx * nx + ny * ny)
         gap = np.inf
         for k in range(b.shape[0]):
@@ -35,7 +37,8 @@ def _widest_gap(a: FloatArray, b: FloatArray, enough: float) -> tuple[float, int
                 gap = d
         gap *= scale
         if gap > best:
-            best, edge = gap, i
+            best = gap
+            edge = i
             if best > enough:
                 break
     return best, edge
@@ -69,15 +72,23 @@ def _add_contacts(
     a: int, b: int, found: int, count: int, poses: FloatArray, problem: IceProblem
 ) -> int:
     """Add the points in ``scratch.spot`` between bodies a and b to ``count`` contacts."""
-    bodies, scratch = problem.bodies, problem.scratch
+    bodies = problem.bodies
+    scratch = problem.scratch
     here = scratch.pose[0] if a == ROBOT else poses[a]
     for i in range(found):
         if count >= scratch.pairs.shape[0]:
             return count
-        spot, row = scratch.spot[i], scratch.points[count]
-        x, y, nx, ny, gap = spot[0], spot[1], spot[2], spot[3], spot[4]
-        ax, ay = x - here[0], y - here[1]
-        bx, by = x - poses[b, 0], y - poses[b, 1]
+        spot = scratch.spot[i]
+        row = scratch.points[count]
+        x = spot[0]
+        y = spot[1]
+        nx = spot[2]
+        ny = spot[3]
+        gap = spot[4]
+        ax = x - here[0]
+        ay = y - here[1]
+        bx = x - poses[b, 0]
+        by = y - poses[b, 1]
         base = 1.0 / bodies.masses[b]
         turn_b = base * bodies.inverse_gyration[b]
         along = base + turn_b * (bx * ny - by * nx) ** 2
@@ -87,9 +98,19 @@ def _add_contacts(
             turn_a = base * bodies.inverse_gyration[a]
             along += base + turn_a * (ax * ny - ay * nx) ** 2
             across += base + turn_a * (ax * nx + ay * ny) ** 2
-        row[0], row[1], row[2], row[3], row[4], row[5] = nx, ny, ax, ay, bx, by
-        row[6], row[7], row[8], row[9], row[10] = gap, along, across, 0.0, 0.0
-        scratch.pairs[count, 0], scratch.pairs[count, 1] = a, b
+        row[0] = nx
+        row[1] = ny
+        row[2] = ax
+        row[3] = ay
+        row[4] = bx
+        row[5] = by
+        row[6] = gap
+        row[7] = along
+        row[8] = across
+        row[9] = 0.0
+        row[10] = 0.0
+        scratch.pairs[count, 0] = a
+        scratch.pairs[count, 1] = b
         count += 1
     return count
 
@@ -97,13 +118,16 @@ def _add_contacts(
 @kernel
 def _meet_neighbours(k: int, count: int, poses: FloatArray, problem: IceProblem) -> int:
     """Contacts of body ``k``, which has begun to move, with all that are near and not yet met."""
-    bodies, scratch, margin = problem.bodies, problem.scratch, problem.settings.step
+    bodies = problem.bodies
+    scratch = problem.scratch
+    margin = problem.settings.step
     scratch.state[k] = 2
     own = scratch.corners[bodies.offsets[k] : bodies.offsets[k + 1]]
     for j in range(poses.shape[0]):
         if j == k or scratch.state[j] == 2:
             continue
-        dx, dy = poses[j, 0] - poses[k, 0], poses[j, 1] - poses[k, 1]
+        dx = poses[j, 0] - poses[k, 0]
+        dy = poses[j, 1] - poses[k, 1]
         reach = bodies.radii[j] + bodies.radii[k] + margin
         if dx * dx + dy * dy >= reach * reach:
             continue
@@ -119,12 +143,22 @@ def _meet_neighbours(k: int, count: int, poses: FloatArray, problem: IceProblem)
 @kernel
 def _relax(count: int, problem: IceProblem) -> None:
     """One round over all contacts: impulses that keep gaps open and hinder sliding."""
-    bodies, settings, scratch = problem.bodies, problem.settings, problem.scratch
-    moves, points, pairs = scratch.moves, scratch.points, scratch.pairs
+    bodies = problem.bodies
+    settings = problem.settings
+    scratch = problem.scratch
+    moves = scratch.moves
+    points = scratch.points
+    pairs = scratch.pairs
     for i in range(count):
-        a, b = pairs[i, 0], pairs[i, 1]
+        a = pairs[i, 0]
+        b = pairs[i, 1]
         row = points[i]
-        nx, ny, ax, ay, bx, by = row[0], row[1], row[2], row[3], row[4], row[5]
+        nx = row[0]
+        ny = row[1]
+        ax = row[2]
+        ay = row[3]
+        bx = row[4]
+        by = row[5]
         move = scratch.pose[1] if a == ROBOT else moves[a]
         rx = moves[b, 0] - moves[b, 2] * by - move[0] + move[2] * ay
         ry = moves[b, 1] + moves[b, 2] * bx - move[1] - move[2] * ax
@@ -134,10 +168,12 @@ def _relax(count: int, problem: IceProblem) -> None:
         limit = friction * row[9]
         slid = row[10]
         row[10] = min(max(slid - (ry * nx - rx * ny) / row[8], -limit), limit)
-        push, drag = row[9] - old, row[10] - slid
+        push = row[9] - old
+        drag = row[10] - slid
         if push == 0.0 and drag == 0.0:
             continue
-        ix, iy = push * nx - drag * ny, push * ny + drag * nx
+        ix = push * nx - drag * ny
+        iy = push * ny + drag * nx
         weight = 1.0 / bodies.masses[b]
         moves[b, 0] += weight * ix
         moves[b, 1] += weight * iy
@@ -152,13 +188,16 @@ def _relax(count: int, problem: IceProblem) -> None:
 @kernel
 def _meet_hull(poses: FloatArray, problem: IceProblem) -> int:
     """Contacts of the hull at ``scratch.pose[0]`` with the objects; their number."""
-    bodies, scratch, margin = problem.bodies, problem.scratch, problem.settings.step
+    bodies = problem.bodies
+    scratch = problem.scratch
+    margin = problem.settings.step
     here = scratch.pose[0]
     transform_points(here, bodies.hull, scratch.hull)
     scratch.state[:] = 0
     count = 0
     for k in range(poses.shape[0]):
-        dx, dy = poses[k, 0] - here[0], poses[k, 1] - here[1]
+        dx = poses[k, 0] - here[0]
+        dy = poses[k, 1] - here[1]
         reach = bodies.hull_radius + bodies.radii[k] + margin
         if dx * dx + dy * dy >= reach * reach:
             continue
@@ -175,7 +214,9 @@ def _meet_hull(poses: FloatArray, problem: IceProblem) -> int:
 @kernel
 def advance_ice(poses: FloatArray, problem: IceProblem) -> float:
     """Move the hull by one small step, ``scratch.pose``, among objects (K, 3); the work [kg m]."""
-    bodies, settings, scratch = problem.bodies, problem.settings, problem.scratch
+    bodies = problem.bodies
+    settings = problem.settings
+    scratch = problem.scratch
     count = _meet_hull(poses, problem)
     if count == 0:
         return 0.0
@@ -191,13 +232,16 @@ def advance_ice(poses: FloatArray, problem: IceProblem) -> float:
     work = 0.0
     for k in range(poses.shape[0]):
         if scratch.state[k] > 0:
-            dx, dy, turn = moves[k, 0], moves[k, 1], moves[k, 2]
+            dx = moves[k, 0]
+            dy = moves[k, 1]
+            turn = moves[k, 2]
             if dx != 0.0 or dy != 0.0 or turn != 0.0:
                 poses[k, 0] += dx
                 poses[k, 1] += dy
                 poses[k, 2] += turn
                 work += bodies.masses[k] * np.sqrt(dx * dx + dy * dy)
-                a, b = bodies.offsets[k], bodies.offsets[k + 1]
+                a = bodies.offsets[k]
+                b = bodies.offsets[k + 1]
                 transform_points(poses[k], bodies.vertices[a:b], scratch.corners[a:b])
     return work
 
@@ -211,12 +255,16 @@ def drive_ice(
     work: float,  # what the result is added to [kg m]
 ) -> tuple[float, int]:
     """Move the hull to a pose in small steps among the objects; the work and how many steps."""
-    here, by = problem.scratch.pose[0], problem.scratch.pose[1]
+    here = problem.scratch.pose[0]
+    by = problem.scratch.pose[1]
     turn = wrap_angle(robot_to[2] - robot_from[2])
-    dx, dy = robot_to[0] - robot_from[0], robot_to[1] - robot_from[1]
+    dx = robot_to[0] - robot_from[0]
+    dy = robot_to[1] - robot_from[1]
     motion = np.sqrt(dx * dx + dy * dy) + abs(turn) * problem.bodies.hull_radius
     steps = max(1, int(np.ceil(motion / problem.settings.step)))
-    by[0], by[1], by[2] = dx / steps, dy / steps, turn / steps
+    by[0] = dx / steps
+    by[1] = dy / steps
+    by[2] = turn / steps
     for step in range(steps):
         for i in range(3):
             here[i] = robot_from[i] + step * by[i]

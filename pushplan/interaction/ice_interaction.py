@@ -48,18 +48,22 @@ def _step(
     moved: FloatArray,
 ) -> bool:
     """Drive the hull a step among the floes, which never hold it."""
-    problem, known = model.problem, model.known
-    bodies, scratch = problem.bodies, problem.scratch
+    problem = model.problem
+    known = model.known
+    bodies = problem.bodies
+    scratch = problem.scratch
     for k in range(poses.shape[0]):  # only where the last step left other corners behind
         if poses[k, 0] != known[k, 0] or poses[k, 1] != known[k, 1] or poses[k, 2] != known[k, 2]:
             copy_into(known[k], poses[k])
-            a, b = bodies.offsets[k], bodies.offsets[k + 1]
+            a = bodies.offsets[k]
+            b = bodies.offsets[k + 1]
             transform_points(poses[k], bodies.vertices[a:b], scratch.corners[a:b])
     work, steps = drive_ice(robot_from, robot_to, poses, problem, 0.0)
     model.tests[0] += steps
     if work > 0.0:
         for k in range(poses.shape[0]):
-            gx, gy = poses[k, 0] - known[k, 0], poses[k, 1] - known[k, 1]
+            gx = poses[k, 0] - known[k, 0]
+            gy = poses[k, 1] - known[k, 1]
             if gx != 0.0 or gy != 0.0 or poses[k, 2] != known[k, 2]:
                 moved[k] += np.sqrt(gx * gx + gy * gy)
                 copy_into(known[k], poses[k])
@@ -138,7 +142,8 @@ class IceInteraction(CheckedFields):
         Raises:
             InvalidInputError: if there is something static in the world.
         """
-        problem, count = self.problem(world), len(world.movables)
+        problem = self.problem(world)
+        count = len(world.movables)
         return IceContacts(
             1.0 / world.movables.masses,
             problem.bodies.radii,

@@ -98,13 +98,16 @@ def _gather(
     """Make every object nearby whose disc comes within ``reach`` of (x, y)."""
     count = 0
     for k in range(poses.shape[0]):
-        dx, dy = poses[k, 0] - x, poses[k, 1] - y
+        dx = poses[k, 0] - x
+        dy = poses[k, 1] - y
         far = reach + bodies.radii[k]
         if dx * dx + dy * dy < far * far:
             scratch.near[count] = k
             count += 1
     scratch.nearby[0] = count
-    scratch.disc[0], scratch.disc[1], scratch.disc[2] = x, y, reach
+    scratch.disc[0] = x
+    scratch.disc[1] = y
+    scratch.disc[2] = reach
 
 
 @kernel
@@ -115,7 +118,8 @@ def _touching(
     count = 0
     for i in range(scratch.nearby[0]):
         k = scratch.near[i]
-        dx, dy = poses[k, 0] - x, poses[k, 1] - y
+        dx = poses[k, 0] - x
+        dy = poses[k, 1] - y
         far = reach + bodies.radii[k]
         if dx * dx + dy * dy < far * far:
             scratch.active[count] = k
@@ -130,7 +134,9 @@ def _widen(k: int, count: int, poses: FloatArray, bodies: Bodies, scratch: Scrat
     Only active objects have moved since the small step began.
     """
     disc = scratch.disc
-    dx, dy, room = poses[k, 0] - disc[0], poses[k, 1] - disc[1], disc[2] - bodies.radii[k]
+    dx = poses[k, 0] - disc[0]
+    dy = poses[k, 1] - disc[1]
+    room = disc[2] - bodies.radii[k]
     if room > 0.0 and dx * dx + dy * dy < room * room:
         return
     _gather(disc[0], disc[1], np.inf, poses, bodies, scratch)
@@ -155,14 +161,16 @@ def _out_of(
     scratch: Scratch,
 ) -> float:
     """Move object ``k`` out of a piece; returns the deepest overlap found."""
-    points, inv = scratch.points, bodies.inverse_gyration[k]
+    points = scratch.points
+    inv = bodies.inverse_gyration[k]
     found = contacts(piece, outline, points)
     if found == 0:
         return 0.0
     depth: float = points[0, 4] if found == 1 else max(points[0, 4], points[1, 4])
     pushed = separate(points, found, scratch.fixed, 0.0, 0.0, poses[k], 1.0, inv)
     if friction > 0.0:
-        limit, before = friction * pushed, scratch.before[k]
+        limit = friction * pushed
+        before = scratch.before[k]
         drag_along(points, found, limit, piece_from, piece_to, before, poses[k], inv)
     transform_points(poses[k], bodies.vertices[bodies.offsets[k] : bodies.offsets[k + 1]], outline)
     return depth
@@ -179,8 +187,11 @@ def _against_robot(
     scratch: Scratch,
 ) -> float:
     """Move object ``k`` out of the robot; returns the deepest overlap found."""
-    deepest, friction, parts = 0.0, settings.friction, bodies.robot_offsets
-    first, end = bodies.offsets[k], bodies.offsets[k + 1]
+    deepest = 0.0
+    friction = settings.friction
+    parts = bodies.robot_offsets
+    first = bodies.offsets[k]
+    end = bodies.offsets[k + 1]
     outline = scratch.outlines[first:end]
     transform_points(poses[k], bodies.vertices[first:end], outline)
     for part in range(parts.shape[0] - 1):
@@ -202,10 +213,16 @@ def _against_static(
     k: int, poses: FloatArray, bodies: Bodies, settings: Settings, scratch: Scratch
 ) -> float:
     """Move object ``k`` out of the walls; returns the deepest overlap found."""
-    deepest, friction, still = 0.0, settings.static_friction, scratch.fixed
-    boxes, parts = bodies.static_boxes, bodies.static_offsets
-    x, y, r = poses[k, 0], poses[k, 1], bodies.radii[k]
-    first, end = bodies.offsets[k], bodies.offsets[k + 1]
+    deepest = 0.0
+    friction = settings.static_friction
+    still = scratch.fixed
+    boxes = bodies.static_boxes
+    parts = bodies.static_offsets
+    x = poses[k, 0]
+    y = poses[k, 1]
+    r = bodies.radii[k]
+    first = bodies.offsets[k]
+    end = bodies.offsets[k + 1]
     outline = scratch.outlines[first:end]
     transform_points(poses[k], bodies.vertices[first:end], outline)
     for part in range(boxes.shape[0]):
@@ -222,20 +239,26 @@ def _against_objects(
 ) -> tuple[float, int]:
     """Move active object ``i`` and its neighbours apart; neighbours that move become active."""
     deepest = 0.0
-    points, masses, gyration = scratch.points, bodies.inverse_masses, bodies.inverse_gyration
+    points = scratch.points
+    masses = bodies.inverse_masses
+    gyration = bodies.inverse_gyration
     k = scratch.active[i]
-    first, end = bodies.offsets[k], bodies.offsets[k + 1]
-    body, outline = bodies.vertices[first:end], scratch.outlines[first:end]
+    first = bodies.offsets[k]
+    end = bodies.offsets[k + 1]
+    body = bodies.vertices[first:end]
+    outline = scratch.outlines[first:end]
     transform_points(poses[k], body, outline)
     _widen(k, count, poses, bodies, scratch)
     for place in range(scratch.nearby[0]):
         other = scratch.near[place]
-        dx, dy = poses[other, 0] - poses[k, 0], poses[other, 1] - poses[k, 1]
+        dx = poses[other, 0] - poses[k, 0]
+        dy = poses[other, 1] - poses[k, 1]
         reach = bodies.radii[other] + bodies.radii[k]
         if other == k or dx * dx + dy * dy >= reach * reach:
             continue
         scratch.tests[0] += 1
-        a, b = bodies.offsets[other], bodies.offsets[other + 1]
+        a = bodies.offsets[other]
+        b = bodies.offsets[other + 1]
         transform_points(poses[other], bodies.vertices[a:b], scratch.outlines[a:b])
         found = contacts(outline, scratch.outlines[a:b], points)
         if found == 0:
@@ -315,17 +338,21 @@ def advance(
     scratch: Scratch,
 ) -> bool:
     """Drive the robot to a near pose, pushing what is in the way; False where it jams."""
-    dx, dy = robot_to[0] - robot_from[0], robot_to[1] - robot_from[1]
+    dx = robot_to[0] - robot_from[0]
+    dy = robot_to[1] - robot_from[1]
     turn = robot_to[2] - robot_from[2]
     turn -= 2.0 * np.pi * np.rint(turn / (2.0 * np.pi))  # the short way
     motion = np.sqrt(dx * dx + dy * dy) + abs(turn) * bodies.robot_radius
-    mid_x, mid_y = robot_from[0] + 0.5 * dx, robot_from[1] + 0.5 * dy
+    mid_x = robot_from[0] + 0.5 * dx
+    mid_y = robot_from[1] + 0.5 * dy
     reach = bodies.robot_radius + 0.5 * np.sqrt(dx * dx + dy * dy)
     _gather(mid_x, mid_y, reach + _NEARBY * bodies.robot_radius, poses, bodies, scratch)
     if _touching(mid_x, mid_y, reach, poses, bodies, scratch) == 0:
         return True
     steps = max(1, int(np.ceil(motion / settings.max_step)))
-    here, there, saved = scratch.here, scratch.there, scratch.saved
+    here = scratch.here
+    there = scratch.there
+    saved = scratch.saved
     copy_into(here, robot_from)
     for step in range(1, steps + 1):
         part = step / steps
@@ -353,8 +380,11 @@ def advance(
 @kernel
 def robot_held(pose: FloatArray, bodies: Bodies, settings: Settings, scratch: Scratch) -> bool:
     """Whether the robot at ``pose`` (3,) overlaps something static by more than the jam depth."""
-    x, y, r = pose[0], pose[1], bodies.robot_radius
-    placed, boxes = False, bodies.static_boxes
+    x = pose[0]
+    y = pose[1]
+    r = bodies.robot_radius
+    placed = False
+    boxes = bodies.static_boxes
     for part in range(boxes.shape[0]):
         if not _reaches(boxes[part], x, y, r):
             continue

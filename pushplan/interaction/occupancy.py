@@ -125,7 +125,8 @@ def ice_density(world: World) -> float:
     movables = world.movables
     if len(movables) == 0:
         return 1.0
-    (x, y), following = movables.vertices.T, next_corner(movables.offsets)
+    (x, y) = movables.vertices.T
+    following = next_corner(movables.offsets)
     area = 0.5 * float((x * y[following] - x[following] * y).sum())
     return float(movables.masses.sum()) / area
 
@@ -142,7 +143,8 @@ def patch_frame(
         about the world's origin, so that patches of one world share their cells.
     """
     right = ahead - 0.5 * math.pi
-    c, s = math.cos(right), math.sin(right)
+    c = math.cos(right)
+    s = math.sin(right)
     x, y = 0.5 * (path[0, :2] + path[-1, :2]) / cell
     column = round(c * x + s * y) - PATCH_CELLS // 2
     row = round(c * y - s * x) - PATCH_CELLS // 2
@@ -169,9 +171,11 @@ def make_batch(passages: Sequence[Passage], *, ahead: float = 0.5 * math.pi) -> 
     frames = np.empty((len(passages), 3))
     for i, passage in enumerate(passages):
         frames[i] = patch_frame(passage.path, ahead, cell)
-        movables, robot = passage.world.movables, passage.world.robot
+        movables = passage.world.movables
+        robot = passage.world.robot
         _cover(movables, movables.poses, frames[i], cell, patches[i, 0])
-        hull, path = (owned(robot.vertices), owned(robot.offsets)), owned(passage.path)
+        hull = (owned(robot.vertices), owned(robot.offsets))
+        path = owned(passage.path)
         cover_sweep(path[:1], *hull, frames[i], cell, patches[i, 1])
         cover_sweep(path, *hull, frames[i], cell, patches[i, 2])
     return PassageBatch(patches, cell, ice_density(first), frames, tuple(passages))

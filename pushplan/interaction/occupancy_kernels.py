@@ -32,9 +32,11 @@ def _fill(
     fine: NDArray[np.uint8],
 ) -> None:
     """Set the samples that lie in an outline to 1."""
-    c, s = math.cos(frame[2]), math.sin(frame[2])
+    c = math.cos(frame[2])
+    s = math.sin(frame[2])
     for i in range(corners.shape[0]):
-        dx, dy = corners[i, 0] - frame[0], corners[i, 1] - frame[1]
+        dx = corners[i, 0] - frame[0]
+        dy = corners[i, 1] - frame[1]
         corners[i, 0] = scale * (c * dx + s * dy)
         corners[i, 1] = scale * (c * dy - s * dx)
     for part in range(offsets.shape[0] - 1):

@@ -23,7 +23,8 @@ def add_works(out: FloatArray, masses: FloatArray, works: FloatArray) -> None:
     for n in range(works.shape[0]):
         works[n] = 0.0
         for k in range(masses.shape[0]):
-            dx, dy = out[n + 1, k, 0] - out[n, k, 0], out[n + 1, k, 1] - out[n, k, 1]
+            dx = out[n + 1, k, 0] - out[n, k, 0]
+            dy = out[n + 1, k, 1] - out[n, k, 1]
             works[n] += masses[k] * np.sqrt(dx * dx + dy * dy)
 
 
@@ -39,9 +40,12 @@ def sweep_near(
 ) -> None:
     """`sweep_ice` with those objects only that are near a short path; the rest stays."""
     middle = path[path.shape[0] // 2]
-    dx, dy = path[:, 0] - middle[0], path[:, 1] - middle[1]
+    dx = path[:, 0] - middle[0]
+    dy = path[:, 1] - middle[1]
     reach = np.sqrt((dx * dx + dy * dy).max()) + bodies.hull_radius + margin
-    gx, gy, far = poses[:, 0] - middle[0], poses[:, 1] - middle[1], reach + bodies.radii
+    gx = poses[:, 0] - middle[0]
+    gy = poses[:, 1] - middle[1]
+    far = reach + bodies.radii
     chosen = np.flatnonzero(gx * gx + gy * gy < far * far)
     part = select_bodies(bodies, chosen)
     here = poses[chosen]
@@ -80,7 +84,8 @@ def path_sweeper(world: World, interaction: InteractionModel | None = None) -> P
     model = default_interaction(world) if interaction is None else interaction
     masses = owned(world.movables.masses)
     if isinstance(model, IceInteraction):
-        ice, ice_settings = model.bodies(world), model.settings(world)
+        ice = model.bodies(world)
+        ice_settings = model.settings(world)
         margin = MARGIN * world.robot.circumscribed_radius
 
         def sweep_floes(
@@ -91,7 +96,8 @@ def path_sweeper(world: World, interaction: InteractionModel | None = None) -> P
 
         return sweep_floes
     if isinstance(model, QuasiStatic):
-        bodies, settings = model.bodies(world), model.settings(world)
+        bodies = model.bodies(world)
+        settings = model.settings(world)
 
         def sweep_objects(
             path: FloatArray, poses: FloatArray, out: FloatArray, works: FloatArray

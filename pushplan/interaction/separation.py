@@ -27,28 +27,38 @@ def separate(
     inv_b: float,
 ) -> float:
     """Move two bodies apart by the least total motion; returns the sum of the impulses."""
-    x0, y0, x1, y1 = points[0, 0], points[0, 1], points[1, 0], points[1, 1]
-    nx, ny = points[0, 2], points[0, 3]
+    x0 = points[0, 0]
+    y0 = points[0, 1]
+    x1 = points[1, 0]
+    y1 = points[1, 1]
+    nx = points[0, 2]
+    ny = points[0, 3]
     arm_a = (x0 - a[0]) * ny - (y0 - a[1]) * nx
     arm_b = (x0 - b[0]) * ny - (y0 - b[1]) * nx
     base = weight_a + weight_b
-    wa, wb = weight_a * inv_a, weight_b * inv_b
+    wa = weight_a * inv_a
+    wb = weight_b * inv_b
     k00 = base + wa * arm_a**2 + wb * arm_b**2
-    first, second = points[0, 4] / k00, 0.0
+    first = points[0, 4] / k00
+    second = 0.0
     if found == 2:
         # the exact solution of the 2 x 2 complementarity problem: both points, or only one
         other_a = (x1 - a[0]) * ny - (y1 - a[1]) * nx
         other_b = (x1 - b[0]) * ny - (y1 - b[1]) * nx
         k11 = base + wa * other_a**2 + wb * other_b**2
         k01 = base + wa * arm_a * other_a + wb * arm_b * other_b
-        d0, d1 = points[0, 4], points[1, 4]
+        d0 = points[0, 4]
+        d1 = points[1, 4]
         det = k00 * k11 - k01 * k01
         if det > 1e-12 * k00 * k11:
-            first, second = (k11 * d0 - k01 * d1) / det, (k00 * d1 - k01 * d0) / det
+            first = (k11 * d0 - k01 * d1) / det
+            second = (k00 * d1 - k01 * d0) / det
             if first < 0.0:
-                first, second = 0.0, d1 / k11
+                first = 0.0
+                second = d1 / k11
             elif second < 0.0:
-                first, second = d0 / k00, 0.0
+                first = d0 / k00
+                second = 0.0
     _nudge(a, x0, y0, -first * weight_a * nx, -first * weight_a * ny, inv_a)
     _nudge(b, x0, y0, first * weight_b * nx, first * weight_b * ny, inv_b)
     if found == 2:
@@ -70,10 +80,15 @@ def drag_along(
     inv: float,  # its 1 / c²
 ) -> None:
     """Coulomb friction: carry the contact sideways with the robot, up to ``limit`` [m]."""
-    x, y, nx, ny = points[0, 0], points[0, 1], points[0, 2], points[0, 3]
+    x = points[0, 0]
+    y = points[0, 1]
+    nx = points[0, 2]
+    ny = points[0, 3]
     if found == 2:
-        x, y = 0.5 * (x + points[1, 0]), 0.5 * (y + points[1, 1])
-    tx, ty = -ny, nx
+        x = 0.5 * (x + points[1, 0])
+        y = 0.5 * (y + points[1, 1])
+    tx = -ny
+    ty = nx
     turn = robot_to[2] - robot_from[2]
     robot = (robot_to[0] - robot_from[0] - turn * (y - robot_to[1])) * tx
     robot += (robot_to[1] - robot_from[1] + turn * (x - robot_to[0])) * ty

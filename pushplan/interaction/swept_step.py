@@ -27,9 +27,12 @@ class SweepCall(types.WrapperAddressProtocol):
     """
 
     def __init__(self, model: InteractionModel, world: World) -> None:
-        self._model, self._world = model, world
+        self._model = model
+        self._world = world
         count = len(world.movables)
-        self.path, self.poses, self.moved = np.zeros((2, 3)), np.zeros((count, 3)), np.zeros(count)
+        self.path = np.zeros((2, 3))
+        self.poses = np.zeros((count, 3))
+        self.moved = np.zeros(count)
         self._error: Exception | None = None
         self._entry = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(self._sweep)
 
@@ -42,7 +45,8 @@ class SweepCall(types.WrapperAddressProtocol):
 
     def raise_error(self) -> None:
         """Raise what the model has raised since the last call."""
-        error, self._error = self._error, None
+        error = self._error
+        self._error = None
         if error is not None:
             raise error
 
@@ -109,7 +113,8 @@ def compile_interaction(
     """
     if isinstance(model, CompiledInteraction):
         return model.compiled(world)
-    call, objects = SweepCall(model, world), world.movables
+    call = SweepCall(model, world)
+    objects = world.movables
     tests = np.zeros(1, np.int64)
     return SweptContacts(
         1.0 / objects.masses, owned(objects.radii), tests, call, call.path, call.poses, call.moved

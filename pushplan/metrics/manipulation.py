@@ -68,7 +68,8 @@ def manipulation_scores(episode: Episode, *, reference: bool = False) -> Manipul
     needed = done & ~episode.world.completed
     shortest = shortest_lengths(episode.world, needed, reference=reference)
     tree = tree_length(episode.world, needed, reference=reference)
-    driven, work = robot_path_length(episode), interaction_work(episode)
+    driven = robot_path_length(episode)
+    work = interaction_work(episode)
     return ManipulationScores(
         success=fraction,
         efficiency=efficiency(tree, driven, everything=fraction == 1.0),
@@ -90,7 +91,8 @@ def shortest_lengths(start: World, chosen: BoolArray, *, reference: bool = False
         chosen: (K,) flags.
         reference: as in `manipulation_scores`.
     """
-    lengths, places = np.zeros(len(chosen)), start.movables.poses[:, :2]
+    lengths = np.zeros(len(chosen))
+    places = start.movables.poses[:, :2]
     if reference:
         ends = _reference_ends(start.manipulation_goal)
         lengths[chosen] = cdist(places[chosen], ends).min(axis=1)

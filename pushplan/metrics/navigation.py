@@ -114,5 +114,6 @@ def e_nav_to_goal_point(episode: Episode) -> float:
 
 def i_nav(episode: Episode) -> float:
     """I_nav of an episode."""
-    length, work = robot_path_length(episode), interaction_work(episode)
+    length = robot_path_length(episode)
+    work = interaction_work(episode)
     return effort(episode.world.robot.mass, length, work)

@@ -46,7 +46,8 @@ def roll_arc(
     steps = int(np.ceil(longest / step_along(curvature, problem.spacing)))
     copy_into(memory.objects, objects)
     memory.moved[:] = 0.0
-    end, last = memory.end, memory.last
+    end = memory.end
+    last = memory.last
     copy_into(last, start)
     for step in range(1, steps + 1):
         length = longest * step / steps
@@ -83,7 +84,8 @@ def sweep_cost(
     contacts = problem.contacts
     contacts.tests[0] = 0
     moved = np.zeros(contacts.radii.shape[0])
-    m0, weight = problem.robot_mass, problem.push_weight
+    m0 = problem.robot_mass
+    weight = problem.push_weight
     for n in range(first + 1, count):
         dx = path.poses[n, 0] - path.poses[n - 1, 0]
         dy = path.poses[n, 1] - path.poses[n - 1, 1]

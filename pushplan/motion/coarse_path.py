@@ -38,7 +38,8 @@ def _cell_weights(
         far = reach[k]
         for r in range(max(within[k, 1], 0), min(within[k, 3] + 1, rows)):
             for c in range(max(within[k, 0], 0), min(within[k, 2] + 1, cols)):
-                x, y = origin[0] + (c + 0.5) * cell, origin[1] + (r + 0.5) * cell
+                x = origin[0] + (c + 0.5) * cell
+                y = origin[1] + (r + 0.5) * cell
                 gap = max(core_distance(x, y, vertices, offsets[k], offsets[k + 1]), 0.0)
                 if gap < far:
                     extra[r, c] += weight[k] * (1.0 - gap / far)
@@ -65,8 +66,10 @@ def coarse_path(
     Returns:
         (N, 2) points about one cell apart [m]; empty where there is no such path.
     """
-    robot, objects = world.robot, world.movables
-    inner, outer = robot.inscribed_radius, robot.circumscribed_radius
+    robot = world.robot
+    objects = world.movables
+    inner = robot.inscribed_radius
+    outer = robot.circumscribed_radius
     cell = _cell(world)
     # walls hold the inscribed disc for certain; the rest of the footprint is a matter of heading
     walls = _wall_weights(keep_out(world), cell, ((inner, np.inf), (1.3 * outer, 2.0)))
@@ -124,7 +127,8 @@ def _cheapest(
     world: World, extra: FloatArray, cell: float, stopped: Callable[[], bool]
 ) -> FloatArray:
     """The cheapest path from the robot to the goal over a grid of weights."""
-    bounds, goal = world.static.bounds, world.navigation_goal
+    bounds = world.static.bounds
+    goal = world.navigation_goal
     rows, cols = extra.shape
     x = bounds[0] + (np.arange(cols) + 0.5) * cell
     y = bounds[1] + (np.arange(rows) + 0.5) * cell

@@ -98,7 +98,9 @@ def is_free(
     scratch: FloatArray,  # (V, 2) memory for the corners
 ) -> bool:
     """Whether a footprint at ``pose`` (3,) overlaps nothing and its origin is in bounds."""
-    x, y, r = pose[0], pose[1], shape.radius
+    x = pose[0]
+    y = pose[1]
+    r = shape.radius
     bounds = among.bounds
     if not (bounds[0] <= x <= bounds[2] and bounds[1] <= y <= bounds[3]):
         return False

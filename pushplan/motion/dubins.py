@@ -34,11 +34,17 @@ def dubins(
     out: FloatArray,  # (3, 2) receives length [m] and curvature [1/m] of the three pieces
 ) -> float:
     """Length [m] of the shortest forward path between two poses under a curvature bound."""
-    dx, dy = end[0] - start[0], end[1] - start[1]
+    dx = end[0] - start[0]
+    dy = end[1] - start[1]
     d = np.sqrt(dx * dx + dy * dy) / radius
     phi = np.arctan2(dy, dx)
-    a, b = _turn(start[2] - phi), _turn(end[2] - phi)
-    sa, ca, sb, cb, cab = np.sin(a), np.cos(a), np.sin(b), np.cos(b), np.cos(a - b)
+    a = _turn(start[2] - phi)
+    b = _turn(end[2] - phi)
+    sa = np.sin(a)
+    ca = np.cos(a)
+    sb = np.sin(b)
+    cb = np.cos(b)
+    cab = np.cos(a - b)
     best = np.inf
     # squares are compared with -1e-9, since rounding may take a zero below zero
     # each word as (first turn, second, third) with +1 left, 0 straight, -1 right
@@ -48,24 +54,30 @@ def dubins(
             square = 2.0 + d * d - 2.0 * cab + 2.0 * d * (sa - sb)
             if square > -1e-9:
                 heading = np.arctan2(cb - ca, d + sa - sb)
-                t, p, q = _turn(heading - a), np.sqrt(max(square, 0.0)), _turn(b - heading)
+                t = _turn(heading - a)
+                p = np.sqrt(max(square, 0.0))
+                q = _turn(b - heading)
         elif word == 1:  # RSR
             square = 2.0 + d * d - 2.0 * cab + 2.0 * d * (sb - sa)
             if square > -1e-9:
                 heading = np.arctan2(ca - cb, d - sa + sb)
-                t, p, q = _turn(a - heading), np.sqrt(max(square, 0.0)), _turn(heading - b)
+                t = _turn(a - heading)
+                p = np.sqrt(max(square, 0.0))
+                q = _turn(heading - b)
         elif word == 2:  # LSR
             square = d * d - 2.0 + 2.0 * cab + 2.0 * d * (sa + sb)
             if square > -1e-9:
                 p = np.sqrt(max(square, 0.0))
                 heading = np.arctan2(-ca - cb, d + sa + sb) - np.arctan2(-2.0, p)
-                t, q = _turn(heading - a), _turn(heading - b)
+                t = _turn(heading - a)
+                q = _turn(heading - b)
         elif word == 3:  # RSL
             square = d * d - 2.0 + 2.0 * cab - 2.0 * d * (sa + sb)
             if square > -1e-9:
                 p = np.sqrt(max(square, 0.0))
                 heading = np.arctan2(ca + cb, d - sa - sb) - np.arctan2(2.0, p)
-                t, q = _turn(a - heading), _turn(b - heading)
+                t = _turn(a - heading)
+                q = _turn(b - heading)
         else:  # RLR and LRL
             side = 1.0 if word == 4 else -1.0
             cosine = (6.0 - d * d + 2.0 * cab + side * 2.0 * d * (sa - sb)) / 8.0
@@ -84,9 +96,12 @@ def dubins(
         first = left if word in (0, 2, 5) else -left
         middle = 0.0 if word < 4 else -first
         last = first if word in (0, 1, 4, 5) else -first
-        out[0, 0], out[0, 1] = t * radius, first
-        out[1, 0], out[1, 1] = p * radius, middle
-        out[2, 0], out[2, 1] = q * radius, last
+        out[0, 0] = t * radius
+        out[0, 1] = first
+        out[1, 0] = p * radius
+        out[1, 1] = middle
+        out[2, 0] = q * radius
+        out[2, 1] = last
     return best * radius
 
 
@@ -94,7 +109,9 @@ def dubins(
 def along_arc(pose: FloatArray, length: float, curvature: float, out: FloatArray) -> None:
     """Drive ``length`` [m] along an arc of constant curvature [1/m] from ``pose`` (3,)."""
     if np.isinf(curvature):
-        out[0], out[1], out[2] = pose[0], pose[1], pose[2] + length * np.sign(curvature)
+        out[0] = pose[0]
+        out[1] = pose[1]
+        out[2] = pose[2] + length * np.sign(curvature)
         return
     turn = length * curvature
     half = 0.5 * turn
@@ -126,7 +143,8 @@ def sample_pieces(
     count = 0
     here = start
     for i in range(pieces.shape[0]):
-        length, curvature = pieces[i, 0], pieces[i, 1]
+        length = pieces[i, 0]
+        curvature = pieces[i, 1]
         if abs(length) < 1e-8 * spacing:
             continue
         steps = int(np.ceil(abs(length) / step_along(curvature, spacing)))

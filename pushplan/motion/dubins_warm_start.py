@@ -32,7 +32,8 @@ def is_far(improver: PathImprover) -> bool:
 
 def warm_start(improver: PathImprover) -> None:
     """Try to drive along the shortest homotopic path, objects or not; the improver keeps it."""
-    problem, size = improver.problem, improver.size
+    problem = improver.problem
+    size = improver.size
     depth = 1.01 * improver.config.inset * size
     if isinstance(improver.goal, GoalDisc):
         depth = improver.goal.radius - 0.99 * float(problem.goal[3])
@@ -81,7 +82,8 @@ def _vias(corners: FloatArray, radius: float, depth: float) -> FloatArray:
     keep = lengths > 1e-9 * radius
     if not keep.any():
         return np.zeros((0, 3))
-    legs, lengths = legs[keep], lengths[keep]
+    legs = legs[keep]
+    lengths = lengths[keep]
     ends = corners[1:][keep]
     headings = np.unwrap(np.arctan2(legs[:, 1], legs[:, 0]))
     found = []

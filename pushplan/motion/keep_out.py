@@ -29,12 +29,14 @@ def keep_out(world: World) -> StaticMap:
     the obstacle, and away. Objects do not count: they may lie at a wall. Corners are sharp
     (`grown_outline`).
     """
-    static, margin = world.static, world.margin
+    static = world.static
+    margin = world.margin
     if margin == 0.0:
         return static
     outlines = [transform(world.robot_pose, part) for part in world.robot.wall_parts]
     reach = world.robot.circumscribed_radius + 2.0 * margin
-    boxes, at = _boxes(static), world.robot_pose[:2]
+    boxes = _boxes(static)
+    at = world.robot_pose[:2]
     near = ((boxes[:, :2] < at + reach) & (boxes[:, 2:] > at - reach)).all(axis=1)
     fractions = []
     for k in np.flatnonzero(near).tolist():

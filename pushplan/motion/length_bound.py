@@ -64,7 +64,8 @@ def turning_length(pose: FloatArray, goal: NavigationGoal, radius: float) -> flo
     else:
         normals = goal.normal[None]
         away = normals @ (goal.point - pose[:2])
-    normals, away = normals[away > 0.0], away[away > 0.0]
+    normals = normals[away > 0.0]
+    away = away[away > 0.0]
     if len(away) == 0:
         return 0.0
     turn = np.abs(np.angle(np.exp(1j * (np.arctan2(normals[:, 1], normals[:, 0]) - pose[2]))))

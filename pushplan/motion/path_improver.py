@@ -62,12 +62,10 @@ class PathImprover:
         turning_radius: float,  # least one of plans at first [m]
     ) -> None:
         world = call.world
-        self.world, self.config, self.rng, self.goal = (
-            world,
-            config,
-            call.rng,
-            world.navigation_goal,
-        )
+        self.world = world
+        self.config = config
+        self.rng = call.rng
+        self.goal = world.navigation_goal
         self.size = world.robot.circumscribed_radius
         self.iterations = self.nodes = self.relaxed = 0
         self.tight = False
@@ -76,7 +74,8 @@ class PathImprover:
         self.lead = self._no_lead = Lead(
             np.empty((0, 2)), owned(world.robot_pose), owned(world.movables.poses)
         )
-        self.best_cost, self.first_solution_s = np.inf, float("nan")
+        self.best_cost = np.inf
+        self.first_solution_s = float("nan")
         self.problem = PathProblem(
             robot_mass=world.robot.mass,
             push_weight=float(config.push_weight),
@@ -91,8 +90,10 @@ class PathImprover:
         )
         # crowded worlds are slow to sweep: look at the stop rule more often
         self._batch = max(1, 10 * config.batch // (10 + len(world.movables)))
-        self._call, self._margin = call, 0.0
-        self._shortcut_pace, self._sweep_pace = Pace(), Pace()
+        self._call = call
+        self._margin = 0.0
+        self._shortcut_pace = Pace()
+        self._sweep_pace = Pace()
         self._best: SweptPath | None = None
 
     def begin(self) -> PlanStatus | None:
@@ -216,7 +217,8 @@ class PathImprover:
 
         Sweeping through a crowd takes its time: None too where the stop rule fires meanwhile.
         """
-        cost, swept = 0.0, 1
+        cost = 0.0
+        swept = 1
         for first, last in self._sweep_pace.pieces(count - 1, self.stopped):
             swept = last + 1
             cost = sweep_cost(path, first, swept, limit, ENDLESS, self.problem)

@@ -31,7 +31,9 @@ def polyline_plan(world: World, points: FloatArray, spacing: float) -> Plan:
     moves = np.diff(path, axis=0)
     lengths = np.hypot(moves[:, 0], moves[:, 1])
     keep = np.concatenate([[True], lengths > 1e-8 * spacing])
-    path, moves, lengths = path[keep], moves[keep[1:]], lengths[keep[1:]]
+    path = path[keep]
+    moves = moves[keep[1:]]
+    lengths = lengths[keep[1:]]
     if len(moves):
         headings = np.arctan2(moves[:, 1], moves[:, 0])
         headings = np.append(headings, headings[-1])
@@ -53,9 +55,12 @@ def polyline_status(world: World, plan: Plan) -> PlanStatus:
     It can where the plan begins at the robot's pose, turns no faster than the robot, and its
     footprint, at poses a fiftieth of its circumscribed radius apart, touches nothing static.
     """
-    robot, poses = world.robot, plan.poses
-    moves, off = np.diff(poses, axis=0), poses[0] - world.robot_pose
-    turns, lasts = np.abs(wrap_angle(moves[:, 2])), np.diff(plan.times)
+    robot = world.robot
+    poses = plan.poses
+    moves = np.diff(poses, axis=0)
+    off = poses[0] - world.robot_pose
+    turns = np.abs(wrap_angle(moves[:, 2]))
+    lasts = np.diff(plan.times)
     fast = turns > robot.max_turn_rate * lasts + 1e-9
     lengths = np.hypot(moves[:, 0], moves[:, 1])
     fast |= turns * robot.min_turning_radius > lengths + 1e-9
@@ -70,6 +75,7 @@ def polyline_status(world: World, plan: Plan) -> PlanStatus:
         first
     ]
     dense = np.concatenate([poses[first] + fraction[:, None] * moves[first], poses[-1:]])
-    walls, shape = obstacles(world.static), footprint(robot)
+    walls = obstacles(world.static)
+    shape = footprint(robot)
     free = first_blocked(dense, len(dense), shape, walls, np.empty_like(shape.vertices))
     return PlanStatus.SOLVED if free == len(dense) else PlanStatus.PATH_ONLY

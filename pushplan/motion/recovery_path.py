@@ -38,7 +38,10 @@ class RecoveryProblem(NamedTuple):
 @kernel
 def can_turn(pose: FloatArray, size: float, among: ConvexObstacles) -> bool:
     """Whether the disc that the robot needs to turn about is within the bounds and free."""
-    x, y, bounds, radius = pose[0], pose[1], among.bounds, _CLEARANCE * size
+    x = pose[0]
+    y = pose[1]
+    bounds = among.bounds
+    radius = _CLEARANCE * size
     if min(x - bounds[0], bounds[2] - x, y - bounds[1], bounds[3] - y) < radius:
         return False
     for s in range(among.boxes.shape[0]):
@@ -47,7 +50,8 @@ def can_turn(pose: FloatArray, size: float, among: ConvexObstacles) -> bool:
             continue
         if y + radius <= box[1] or y - radius >= box[3]:
             continue
-        first, end = among.offsets[s], among.offsets[s + 1]
+        first = among.offsets[s]
+        end = among.offsets[s + 1]
         if core_distance(x, y, among.vertices, first, end) < radius:
             return False
     return True
@@ -73,18 +77,26 @@ def search_recovery(problem: RecoveryProblem) -> tuple[FloatArray, IntArray, int
         (M, 3) poses that were found, (M,) the pose before each, and the last one of the drive; -1
         if there is none.
     """
-    start, body, grown, among = problem.start, problem.body, problem.grown, problem.among
+    start = problem.start
+    body = problem.body
+    grown = problem.grown
+    among = problem.among
     size = problem.size
     unit = _CELL * STEP
-    half, turns = int(_REACH / unit), math.ceil(2.0 * math.pi / unit)
+    half = int(_REACH / unit)
+    turns = math.ceil(2.0 * math.pi / unit)
     seen = np.zeros((2 * half + 1, 2 * half + 1, turns), dtype=np.bool_)
-    nodes, before = np.empty((_MOST, 3)), np.empty(_MOST, dtype=np.int64)
+    nodes = np.empty((_MOST, 3))
+    before = np.empty(_MOST, dtype=np.int64)
     scratch = np.empty((max(len(body.vertices), len(grown.vertices)), 2))
-    pose, between, allowed = np.empty(3), np.empty(3), np.empty(2)
+    pose = np.empty(3)
+    between = np.empty(3)
+    allowed = np.empty(2)
     allowed[0] = static_depth(start, body, among, scratch) + _DEEPER * size
     allowed[1] = static_depth(start, grown, among, scratch) + _DEEPER * size
     copy_into(nodes[0], start)
-    before[0], count = -1, 1
+    before[0] = -1
+    count = 1
     at = 0
     while at < count:
         for distance, turn in problem.steps:
@@ -125,7 +137,8 @@ def recovery_path(world: World, margin: float) -> FloatArray | None:
     """
     size = world.robot.circumscribed_radius
     objects = [world.movables.outline_world(k) for k in range(len(world.movables))]
-    start, walls = np.array(world.robot_pose), obstacles(world.static)
+    start = np.array(world.robot_pose)
+    walls = obstacles(world.static)
     steps = STEP * np.array([(size, curvature) for curvature in _CURVATURES])
     if world.robot.min_speed < 0.0:
         steps = np.concatenate([steps, steps * (-1.0, 1.0)])

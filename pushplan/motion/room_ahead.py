@@ -27,7 +27,8 @@ _MOST = 5_000  # poses that are looked at, ahead; then it counts as getting away
 _MOST_OF_ALL = 60_000  # the same where the robot may do all that it can
 _PIECE = 250  # poses between two looks at the stop rule: about a millisecond
 _FINER = 0.25  # steps of the second look, before a robot is said to be boxed in
-_CLOSED, _PAUSED = -1, -2
+_CLOSED = -1
+_PAUSED = -2
 
 
 class Room(NamedTuple):
@@ -71,8 +72,11 @@ def _explore(
 
     Objects do not count, as they may be pushed.
     """
-    poses, counters, start = found.poses, found.counters, found.poses[0]
-    half, turns = found.seen.shape[0] // 2, found.seen.shape[2]
+    poses = found.poses
+    counters = found.counters
+    start = found.poses[0]
+    half = found.seen.shape[0] // 2
+    turns = found.seen.shape[2]
     corners = np.empty_like(room.footprint.vertices)
     pose = np.empty(3)
     while counters[0] < counters[1] and counters[3] < upto:
@@ -84,8 +88,10 @@ def _explore(
             counters[1] -= 1
             at = found.open[counters[1]]
         for m in range(rules.moves.shape[0]):
-            length, curvature = rules.moves[m, 0], rules.moves[m, 1]
-            steps, free = 1, True
+            length = rules.moves[m, 0]
+            curvature = rules.moves[m, 1]
+            steps = 1
+            free = True
             if rules.breadth:  # the way may be driven: these are the poses that its plan will have
                 steps = int(np.ceil(abs(length) / step_along(curvature, room.spacing)))
             for step in range(1, steps + 1):
@@ -93,7 +99,8 @@ def _explore(
                 free = free and is_free(pose, room.footprint, room.walls, corners)
             if not free:
                 continue
-            dx, dy = pose[0] - start[0], pose[1] - start[1]
+            dx = pose[0] - start[0]
+            dy = pose[1] - start[1]
             j = half + int(np.rint(dx / sides[0]))
             i = half + int(np.rint(dy / sides[0]))
             t = int(np.floor(pose[2] % (2.0 * np.pi) / sides[1])) % turns
@@ -102,7 +109,8 @@ def _explore(
                 continue
             found.seen[i, j, t] = True
             copy_into(poses[new], pose)
-            found.before[new], found.moves[new] = at, m
+            found.before[new] = at
+            found.moves[new] = m
             counters[2] += 1
             away = dx * dx + dy * dy > rules.reach * rules.reach
             if rules.clearance > 0.0:
@@ -165,7 +173,8 @@ def way_to_turn(
     Returns:
         (E, 2) arcs; None where there is no such drive, or the robot can turn about where it is.
     """
-    size, swept = robot.circumscribed_radius, room.footprint.radius
+    size = robot.circumscribed_radius
+    swept = room.footprint.radius
     if can_turn(start, swept, room.walls):
         return None
     moves = _moves(robot, _STEP, size)
@@ -212,7 +221,8 @@ def _search(
         if curvature
     ]
     turn = min(max(_CELL * min(turns), _LEAST_TURN), math.pi)
-    half, headings = int(rules.reach / cell) + 2, math.ceil(math.tau / turn)
+    half = int(rules.reach / cell) + 2
+    headings = math.ceil(math.tau / turn)
     capacity = len(rules.moves) * most + 1
     found = _Explored(
         poses=np.empty((capacity, 3)),
@@ -223,7 +233,8 @@ def _search(
         seen=np.zeros((2 * half + 1, 2 * half + 1, headings), dtype=np.bool_),
     )
     found.poses[0] = start
-    outcome, sides = _PAUSED, np.array([cell, turn])
+    outcome = _PAUSED
+    sides = np.array([cell, turn])
     for upto in range(_PIECE, most + _PIECE, _PIECE):
         if outcome != _PAUSED or stopped():
             break

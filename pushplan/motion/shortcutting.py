@@ -109,7 +109,8 @@ def _propose(
         return first, new, size
     if size + rest > trial.poses.shape[0]:
         return first, 0, 0
-    old, curvatures = path.poses[:count], path.curvatures[:count]
+    old = path.poses[:count]
+    curvatures = path.curvatures[:count]
     size = copy_rest(old, curvatures, last, trial.poses, trial.curvatures, size)
     return first, new, size
 
@@ -127,7 +128,8 @@ def shortcut(
     """Try a shortcut for each row of ``draws``; returns number of poses and cost of the path."""
     shape = problem.footprint
     scratch = np.empty_like(shape.vertices)
-    m0, weight = problem.robot_mass, problem.push_weight
+    m0 = problem.robot_mass
+    weight = problem.push_weight
     for i in range(draws.shape[0]):
         if count < 4:
             break
@@ -155,5 +157,6 @@ def shortcut(
                 copy_into(path.objects[n], trial.objects[n])
                 path.lengths[n] = trial.lengths[n]
                 path.works[n] = trial.works[n]
-            cost, count = found, size
+            cost = found
+            count = size
     return count, cost

@@ -62,7 +62,8 @@ def start_margin(world: World, margin: float) -> float | None:
 
 def goal_is_outside(world: World) -> bool:
     """Whether the goal is a disc that lies outside the workspace, where no path can lead."""
-    goal, bounds = world.navigation_goal, world.static.bounds
+    goal = world.navigation_goal
+    bounds = world.static.bounds
     if not isinstance(goal, GoalDisc):
         return False
     nearest = np.clip(goal.center, bounds[:2], bounds[2:])
@@ -92,7 +93,8 @@ def timed_plan(
     robot = world.robot
     count = len(path.poses)
     ahead = np.append(path.curvatures[1:], 0.0)  # curvature from each pose on
-    on_spot, signs = np.isinf(ahead), np.sign(ahead)
+    on_spot = np.isinf(ahead)
+    signs = np.sign(ahead)
     ahead[on_spot] = 0.0
     speeds = robot.max_speed * np.ones(count)
     turn_rate = turn_fraction * robot.max_turn_rate
@@ -146,7 +148,8 @@ def _eased(
     # half of the turn acceleration is for changes of speed on an arc, half for changes of curvature
     most = np.minimum(robot.max_acceleration, 0.5 * turning / np.maximum(np.abs(curvatures), 1e-12))
     most[spot] = turning
-    limits, between = np.abs(rates), 0.5 * (extents[1:] + extents[:-1])
+    limits = np.abs(rates)
+    between = 0.5 * (extents[1:] + extents[:-1])
     changes = np.maximum(np.abs(np.diff(curvatures)), 1e-12)
     allowed = np.sqrt(0.5 * turning * between / changes)
     limits[1:] = np.minimum(limits[1:], allowed)

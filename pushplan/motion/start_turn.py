@@ -73,7 +73,8 @@ def drive_to_turn(improver: PathImprover) -> Lead | None:
     Returns:
         The drive; None where there is none, or the robot can turn about where it is.
     """
-    world, problem = improver.world, improver.problem
+    world = improver.world
+    problem = improver.problem
     start = owned(world.robot_pose)
     boxes = unflatten(world.movables.vertices_world, world.movables.offsets)
     among = obstacles(keep_out(world), boxes)
@@ -118,11 +119,14 @@ def _turn_freely(
         The angle [rad], the heading error that is left [rad], and (K, 3) poses of the objects.
     """
     steps = int(np.ceil(abs(angle) / MAX_TURN))
-    here, last = start.copy(), start.copy()
-    poses, moved = objects.copy(), np.zeros(objects.shape[0])
+    here = start.copy()
+    last = start.copy()
+    poses = objects.copy()
+    moved = np.zeros(objects.shape[0])
     best_poses = poses.copy()
     corners = np.empty_like(problem.footprint.vertices)
-    best, turned = np.abs((angle + np.pi) % (2.0 * np.pi) - np.pi), 0.0
+    best = np.abs((angle + np.pi) % (2.0 * np.pi) - np.pi)
+    turned = 0.0
     for step in range(1, steps + 1):
         here[2] = start[2] + angle * step / steps
         if not is_free(here, problem.footprint, problem.walls, corners):
@@ -133,6 +137,7 @@ def _turn_freely(
         left = angle - angle * step / steps
         error = np.abs((left + np.pi) % (2.0 * np.pi) - np.pi)
         if error < best:
-            best, turned = error, angle * step / steps
+            best = error
+            turned = angle * step / steps
             copy_into(best_poses, poses)
     return turned, best, best_poses

@@ -23,7 +23,9 @@ def transport_bound(world: World) -> float:
         InvalidInputError: if the goal is not one for the objects.
     """
     world = world.with_fixed_as_static()
-    goal, movables, robot = world.manipulation_goal, world.movables, world.robot
+    goal = world.manipulation_goal
+    movables = world.movables
+    robot = world.robot
     left = np.flatnonzero(~world.completed)
     if len(left) == 0:
         return 0.0

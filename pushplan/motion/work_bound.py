@@ -82,7 +82,8 @@ def work_bound(
         return WorkBound(least, least, 1)
     order = itertools.count()
     heap = [(root.bound, next(order), root)]
-    relaxed, nodes = search.cost(root), 1
+    relaxed = search.cost(root)
+    nodes = 1
     while not stopped() and nodes < most_nodes:
         bound, _, node = heap[0]
         if bound >= (1.0 - tolerance) * relaxed:
@@ -103,8 +104,11 @@ class _Relaxation:
     """Paths of the inscribed disc of the robot, among objects that are discs."""
 
     def __init__(self, world: World) -> None:
-        self.world, self.static, self.goal = world, keep_out(world), world.navigation_goal
-        self.mass, self.masses = world.robot.mass, world.movables.masses
+        self.world = world
+        self.static = keep_out(world)
+        self.goal = world.navigation_goal
+        self.mass = world.robot.mass
+        self.masses = world.movables.masses
         self.clearance = (1.0 - SLIM) * world.robot.inscribed_radius
         self.start = world.robot_pose[:2]
         self.centers = world.movables.poses[:, :2]
@@ -136,7 +140,8 @@ class _Relaxation:
             return []
         deep = node.high[k] > self.inner[k]
         middle = self.inner[k] if deep else 0.5 * (node.low[k] + depths[k])
-        less, more = node.high.copy(), node.low.copy()
+        less = node.high.copy()
+        more = node.low.copy()
         less[k] = more[k] = middle
         return [self._node(node.low, less), self._node(more, node.high)]
 

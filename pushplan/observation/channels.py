@@ -52,7 +52,8 @@ def fill_hidden(image: Image, view: View, source: BendDistances, per_metre: floa
     """
     pose = view.world.robot_pose
     bends, lengths = source.in_sight(float(pose[0]), float(pose[1]))
-    origin, step = source.grid.origin, source.grid.resolution
+    origin = source.grid.origin
+    step = source.grid.resolution
     sight = _Sight(source.loops, source.offsets, source.table, origin, step, bends, lengths)
     _fill_hidden(image, view.numbers, pose[None, :2], sight, per_metre)
 
@@ -79,13 +80,16 @@ def _fill_hidden(
 ) -> None:
     """Overwrite the pixels in the shadow of the loops by the length of the path to them."""
     loops, offsets, table, origin, step, bends, lengths = sight  # quicker than in the loops
-    spots, at = np.empty_like(loops), np.empty((1, 2))
+    spots = np.empty_like(loops)
+    at = np.empty((1, 2))
     to_pixels(view, loops, spots)
     to_pixels(view, eye, at)
     hidden = np.zeros(image.shape, dtype=np.uint8)
     fill_shadows(hidden, at[0, 0], at[0, 1], spots, offsets, 1)
-    c, s = math.cos(view[2]), math.sin(view[2])
-    rows, cols = table.shape[0], table.shape[1]
+    c = math.cos(view[2])
+    s = math.sin(view[2])
+    rows = table.shape[0]
+    cols = table.shape[1]
     for r in range(image.shape[0]):
         up = (0.5 * view[3] - r - 0.5) * view[5]
         for q in range(image.shape[1]):
@@ -96,7 +100,8 @@ def _fill_hidden(
             v = (view[1] + s * up + c * left - origin[1]) / step
             best = math.inf
             if 0.0 <= u < cols and 0.0 <= v < rows:  # ways stay inside the bounds
-                i, j = int(v), int(u)
+                i = int(v)
+                j = int(u)
                 for k in range(bends.shape[0]):
                     best = min(best, lengths[k] + table[i, j, bends[k]])
             image[r, q] = int(min(255.0, per_metre * best + 0.5))

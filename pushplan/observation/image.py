@@ -78,7 +78,8 @@ class ImageObservation(CheckedFields):
         x, y, heading = world.robot_pose.tolist()
         up = 0.5 * math.pi if self.north_up else heading
         pose = np.array([x + self.shift * math.cos(up), y + self.shift * math.sin(up), up])
-        (rows, cols), (height, width) = self.pixels, self.window
+        (rows, cols) = self.pixels
+        (height, width) = self.window
         return View(world, pose, rows, cols, height / rows, width / cols, self.shift)
 
     def observe(self, world: World) -> NDArray[np.uint8]:

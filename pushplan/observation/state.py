@@ -13,7 +13,8 @@ from pushplan.world.checked_fields import CheckedFields, NonNegativeInt, Positiv
 from pushplan.world.checks import FloatArray
 from pushplan.world.outline import centroid
 
-_OWN, _EACH = 6, 5
+_OWN = 6
+_EACH = 5
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,8 @@ class StateObservation(LimitedVector, CheckedFields):
     def observe(self, world: World) -> NDArray[np.float32]:
         """The vector."""
         x, y, theta = world.robot_pose
-        c, s = np.cos(theta), np.sin(theta)
+        c = np.cos(theta)
+        s = np.sin(theta)
         to_body = np.array([[c, -s], [s, c]])  # row vectors times this turn into the body frame
         objects = world.movables.poses
         relative = (objects[:, :2] - world.robot_pose[:2]) @ to_body
@@ -51,7 +53,9 @@ class StateObservation(LimitedVector, CheckedFields):
         if len(rows) and not 0 <= rows.min() <= rows.max() < self.max_objects:
             nearest = np.argsort(np.hypot(relative[:, 0], relative[:, 1]), kind="stable")
             keep = np.sort(nearest[: self.max_objects])
-            objects, relative, rows = objects[keep], relative[keep], np.arange(len(keep))
+            objects = objects[keep]
+            relative = relative[keep]
+            rows = np.arange(len(keep))
         out = np.zeros(self.shape)
         out[:4] = x, y, c, s
         out[4:6] = (_goal_point(world) - world.robot_pose[:2]) @ to_body

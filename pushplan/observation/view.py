@@ -23,9 +23,11 @@ Image = np.ndarray[tuple[int, int], np.dtype[np.uint8]]
 @kernel(allocates=True)
 def to_pixels(view: FloatArray, points: FloatArray, out: FloatArray) -> None:
     """World points (N, 2) [m] to column and row [px]."""
-    c, s = np.cos(view[2]), np.sin(view[2])
+    c = np.cos(view[2])
+    s = np.sin(view[2])
     for i in range(points.shape[0]):
-        dx, dy = points[i, 0] - view[0], points[i, 1] - view[1]
+        dx = points[i, 0] - view[0]
+        dy = points[i, 1] - view[1]
         out[i, 0] = 0.5 * view[4] - (c * dy - s * dx) / view[6]
         out[i, 1] = 0.5 * view[3] - (c * dx + s * dy) / view[5]
 
@@ -53,12 +55,14 @@ def fill_bodies(
 ) -> None:
     """Fill the outlines of the bodies that the window may show."""
     reach = 0.5 * np.hypot(view[3] * view[5], view[4] * view[6])
-    corners, spots = np.empty_like(vertices), np.empty_like(vertices)
+    corners = np.empty_like(vertices)
+    spots = np.empty_like(vertices)
     for k in range(poses.shape[0]):
         far = reach + radii[k]
         if (poses[k, 0] - view[0]) ** 2 + (poses[k, 1] - view[1]) ** 2 > far * far:
             continue
-        a, b = offsets[k], offsets[k + 1]
+        a = offsets[k]
+        b = offsets[k + 1]
         transform_points(poses[k], vertices[a:b], corners[a:b])
         to_pixels(view, corners[a:b], spots[a:b])
         fill_convex(image, spots[a:b], value)
@@ -69,15 +73,19 @@ def sample(
     image: Image, view: FloatArray, values: Image, ox: float, oy: float, step: float
 ) -> None:
     """Read a raster with its first corner at ox, oy and cells of ``step`` [m] at every pixel."""
-    c, s = np.cos(view[2]), np.sin(view[2])
+    c = np.cos(view[2])
+    s = np.sin(view[2])
     rows, cols = values.shape
-    up, across = view[5] / step, view[6] / step
+    up = view[5] / step
+    across = view[6] / step
     # raster coordinates of the first pixel, and how they change along rows and columns
-    front, left = 0.5 * (view[3] - 1.0) * up, 0.5 * (view[4] - 1.0) * across
+    front = 0.5 * (view[3] - 1.0) * up
+    left = 0.5 * (view[4] - 1.0) * across
     u0 = (view[0] - ox) / step + c * front - s * left
     v0 = (view[1] - oy) / step + s * front + c * left
     for r in range(image.shape[0]):
-        u, v = u0 - r * up * c, v0 - r * up * s
+        u = u0 - r * up * c
+        v = v0 - r * up * s
         for q in range(image.shape[1]):
             j = min(max(int(np.floor(u + q * across * s)), 0), cols - 1)
             i = min(max(int(np.floor(v - q * across * c)), 0), rows - 1)

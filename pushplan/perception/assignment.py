@@ -36,8 +36,10 @@ def assign(
     ks = np.repeat(np.arange(len(places)), [len(some) for some in near])
     js = np.concatenate([np.array(some, dtype=np.int64) for some in near])
     alone = (np.bincount(ks, minlength=len(places))[ks] == 1) & (np.bincount(js)[js] == 1)
-    first, second = ks[alone], js[alone]
-    ks, js = ks[~alone], js[~alone]
+    first = ks[alone]
+    second = js[alone]
+    ks = ks[~alone]
+    js = js[~alone]
     away = np.hypot(*(places[ks] - seen_places[js]).T)
     ratio = np.log(seen_sizes[js] / sizes[ks]) / _SIZE_SPREAD
     # of a normal distribution with a third of the gate: a wide gate must not win by its width

@@ -49,20 +49,26 @@ def align(
         spreads: (G,) standard deviations of the headings about the expected ones [rad].
         sampled: whether the points are samples, which correspond only nearly.
     """
-    count, each = shapes.shape[1], np.arange(len(shapes))
-    middles, places = shapes.mean(axis=1), seen.mean(axis=1)
-    body, world = shapes - middles[:, None], seen - places[:, None]
+    count = shapes.shape[1]
+    each = np.arange(len(shapes))
+    middles = shapes.mean(axis=1)
+    places = seen.mean(axis=1)
+    body = shapes - middles[:, None]
+    world = seen - places[:, None]
     product = np.fft.fft(world) * np.conj(np.fft.fft(body))
     correlation = np.fft.ifft(product)  # (G, N), one for each order
-    moments, others = (np.abs(body) ** 2).sum(axis=1), (np.abs(world) ** 2).sum(axis=1)
-    sizes, ahead = np.abs(correlation), np.exp(-1j * expected)
+    moments = (np.abs(body) ** 2).sum(axis=1)
+    others = (np.abs(world) ** 2).sum(axis=1)
+    sizes = np.abs(correlation)
+    ahead = np.exp(-1j * expected)
     left = (moments + others)[:, None] - 2.0 * sizes
     turns = np.angle(correlation * ahead[:, None])
     cost = left / variances[:, None] + (turns / spreads[:, None]) ** 2
     orders = np.argmin(cost, axis=1)
     best = correlation[each, orders]
     if sampled:  # the peak lies up to half a sample away
-        before, here = sizes[each, orders - 1], sizes[each, orders]
+        before = sizes[each, orders - 1]
+        here = sizes[each, orders]
         after = sizes[each, (orders + 1) % count]
         bend = np.minimum(before - 2.0 * here + after, -1e-300)
         shift = orders + np.clip(0.5 * (before - after) / bend, -0.5, 0.5)

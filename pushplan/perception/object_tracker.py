@@ -137,7 +137,8 @@ class ObjectTracker:
             return self.movables
         sightings = sightings_of(points, labels)
         self.flat += len(points) - len(sightings)
-        first, self.time = self.time is None, stamp
+        first = self.time is None
+        self.time = stamp
         for track in self._tracks:
             track.predict(stamp)
         rest = self._match(sightings)
@@ -183,7 +184,8 @@ class ObjectTracker:
     def _doubt(self, sightings: list[Sighting]) -> None:
         """Believe what was seen often enough at a place, and remember the others."""
         assert self.time is not None
-        before, self._candidates = self._candidates, []
+        before = self._candidates
+        self._candidates = []
         for sighting in sightings:
             lost = self._lost(sighting)
             if sighting.label is not None and lost is None:
@@ -232,12 +234,14 @@ class ObjectTracker:
         shown = {one.label: (len(one.shape), one.sightings.bit_length()) for one in self._tracks}
         better = [one for one in self._tracks if self._shown.get(one.label) != shown[one.label]]
         gone = [label for label in self._shown if label not in shown]
-        movables, self._shown = self.movables, shown
+        movables = self.movables
+        self._shown = shown
         if better or gone:
             hulls = convex_outlines("outline", [convex_hull(_plane(one.shape)) for one in better])
             areas, centres = areas_and_centroids(*flatten(hulls))
             for one, area, centre in zip(better, areas.tolist(), centres.tolist(), strict=True):
-                one.area, one.middle = area, complex(*centre)
+                one.area = area
+                one.middle = complex(*centre)
             changed = Movables.from_outlines(
                 [hull - centre for hull, centre in zip(hulls, centres, strict=True)],
                 np.zeros((len(better), 3)),

@@ -38,12 +38,14 @@ def sightings_of(points: Sequence[FloatArray], labels: FloatArray | None) -> lis
     if not closed:
         return []
     vertices, offsets = flatten([points[i] for i in closed])
-    counts, starts = np.diff(offsets), offsets[:-1]
+    counts = np.diff(offsets)
+    starts = offsets[:-1]
     clouds = np.full(len(closed), shapely.MultiPoint())
     owners = np.repeat(np.arange(len(closed)), counts)
     shapely.multipoints(shapely.points(vertices), indices=owners, out=clouds)
     hulls = shapely.convex_hull(clouds)
-    areas, centres = shapely.area(hulls), shapely.get_coordinates(shapely.centroid(hulls))
+    areas = shapely.area(hulls)
+    centres = shapely.get_coordinates(shapely.centroid(hulls))
     shifted = vertices - np.repeat(vertices[starts], counts, axis=0)
     after = shifted[next_corner(offsets)]
     cross = shifted[:, 0] * after[:, 1] - shifted[:, 1] * after[:, 0]

@@ -32,7 +32,9 @@ class Axis:
 
     def restart(self, variance: float) -> None:
         """Know a place and that the object rests, or nearly."""
-        self.variance, self.shared, self.of_rate = variance, 0.0, 0.0
+        self.variance = variance
+        self.shared = 0.0
+        self.of_rate = 0.0
 
     def predict(self, step: float) -> None:
         """Pass some time [s]."""
@@ -49,7 +51,8 @@ class Axis:
     def correct(self, variance: float) -> tuple[float, float]:
         """Gains for the quantity and for its rate [1/s], given the variance of an observation."""
         total = self.variance + variance
-        gain, rate_gain = self.variance / total, self.shared / total
+        gain = self.variance / total
+        rate_gain = self.shared / total
         self.of_rate -= rate_gain * self.shared
         self.shared -= gain * self.shared
         self.variance -= gain * self.variance
@@ -69,14 +72,18 @@ class Track:
     def __init__(
         self, label: int, first: Sighting, time: float, accelerations: tuple[float, float]
     ) -> None:
-        self.label, self.area = label, first.area
-        self.centre, self.heading = first.centre, 0.0
+        self.label = label
+        self.area = first.area
+        self.centre = first.centre
+        self.heading = 0.0
         self.middle = 0j  # centroid of the shape's hull, in the frame of the body
-        self.velocity, self.turn_rate = 0j, 0.0
+        self.velocity = 0j
+        self.turn_rate = 0.0
         self.shape = first.contour - first.centre
         self.radius = float(np.abs(self.shape).max())
         self.variance = (_FIRST_NOISE * self.radius) ** 2
-        self.sightings, self.votes = 1, 1
+        self.sightings = 1
+        self.votes = 1
         self.seen_at = self.time = time
         self.place = Axis(accelerations[0], self.variance / len(self.shape))
         away = self.shape - self.shape.mean()
@@ -126,7 +133,9 @@ class Track:
 
     def jump(self, centre: complex) -> None:
         """Expect the object elsewhere, where it lies in any direction."""
-        self.velocity, self.turn_rate, self.centre = 0j, 0.0, centre
+        self.velocity = 0j
+        self.turn_rate = 0.0
+        self.centre = centre
         self.place.restart(self.radius**2)
         self.direction.restart(math.pi**2)
 
@@ -141,7 +150,9 @@ class Track:
             return
         self.votes -= 1
         if self.votes < 0:
-            self.shape, self.votes, self.sightings = (seen - centre) * into_body, 1, 0
+            self.shape = (seen - centre) * into_body
+            self.votes = 1
+            self.sightings = 0
 
 
 def see_all(tracks: Sequence[Track], contours: Sequence[Contour]) -> None:
@@ -152,7 +163,8 @@ def see_all(tracks: Sequence[Track], contours: Sequence[Contour]) -> None:
         groups.setdefault(len(seen) if same else 0, []).append(k)
     for corners, members in groups.items():
         some = [tracks[k] for k in members]
-        shapes, seen_there = [one.shape for one in some], [contours[k] for k in members]
+        shapes = [one.shape for one in some]
+        seen_there = [contours[k] for k in members]
         if not corners:
             shapes = [resampled(shape) for shape in shapes]
             seen_there = [resampled(seen) for seen in seen_there]

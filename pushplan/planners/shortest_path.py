@@ -45,12 +45,16 @@ class ShortestPath:
         """
         call = PlanningCall(world, stop, rng)
         world = call.world
-        robot, goal = world.robot, world.navigation_goal
-        start, looks, late = world.robot_pose[:2], 0, False
+        robot = world.robot
+        goal = world.navigation_goal
+        start = world.robot_pose[:2]
+        looks = 0
+        late = False
 
         def stopped() -> bool:
             nonlocal looks, late
-            late, looks = call.check(looks, math.inf), looks + 1
+            late = call.check(looks, math.inf)
+            looks = looks + 1
             return late
 
         for clearance in (robot.circumscribed_radius, robot.inscribed_radius):

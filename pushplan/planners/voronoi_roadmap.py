@@ -82,7 +82,8 @@ class Skeleton:
         try:
             status, points = self._path(world, call)
         except Stopped:
-            status, points = call.stopped_status, None
+            status = call.stopped_status
+            points = None
         if points is None:
             return call.result(status, iterations=1)
         plan = polyline_plan(world, points, self.spacing * world.robot.circumscribed_radius)
@@ -146,7 +147,8 @@ class Skeleton:
         """The cheapest path along the diagram, None where it does not lead to the goal."""
         go_on(stopped)
         # about the robot, in units of its size: the same diagram wherever the world is
-        start, size = world.robot_pose[:2], world.robot.circumscribed_radius
+        start = world.robot_pose[:2]
+        size = world.robot.circumscribed_radius
         sites = (sites - start) / size
         try:
             triangles = Delaunay(sites)
@@ -176,11 +178,13 @@ class Skeleton:
         entry = known[np.atleast_1d(nearest)]
         ways = np.column_stack([np.full(len(entry), len(vertices) - 1), entry])
         edges = np.concatenate([ridges, ways])
-        walls, places = _Walls(world, stopped), start + size * vertices
+        walls = _Walls(world, stopped)
+        places = start + size * vertices
         edges = edges[walls.are_clear(places[edges[:, 0]], places[edges[:, 1]])]
         half = max(world.robot.inscribed_radius / size, 0.1)
         clear = np.asarray(cKDTree(sites).query(vertices)[0])
-        a, b = edges[:, 0], edges[:, 1]
+        a = edges[:, 0]
+        b = edges[:, 1]
         lengths = np.hypot(*(vertices[a] - vertices[b]).T)
         missing = np.maximum(1.0 - np.minimum(clear[a], clear[b]) / half, 0)
         costs = lengths * (1.0 + self.narrow * missing) + 1e-12
@@ -189,7 +193,8 @@ class Skeleton:
         table, previous = dijkstra(
             graph, directed=False, indices=[len(vertices) - 1], return_predecessors=True
         )
-        best, before = table[0], previous[0]
+        best = table[0]
+        before = previous[0]
         # the last stretch is straight ahead to the goal, and a little into it
         depth = 0.02 * size
         if isinstance(goal, GoalDisc):
@@ -220,7 +225,8 @@ class _Walls:
     """What the robot's inscribed disc may not touch."""
 
     def __init__(self, world: World, stopped: Callable[[], bool]) -> None:
-        static, clearance = keep_out(world), (1.0 - 1e-6) * world.robot.inscribed_radius
+        static = keep_out(world)
+        clearance = (1.0 - 1e-6) * world.robot.inscribed_radius
         self._obstacles = obstacles_of(static, clearance)
         self._grid = obstacle_grid(static, clearance, 0.0)
         self._seen = np.zeros(len(self._obstacles.radii) + 1, dtype=np.int64)
@@ -268,8 +274,10 @@ def _merged(corners: FloatArray, ridges: IntArray) -> IntArray:
 
 def _circumcentres(triangles: FloatArray) -> FloatArray:
     """(T, 2) of triangles (T, 3, 2), not finite where one is flat."""
-    u, v = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
-    uu, vv = (u**2).sum(axis=1), (v**2).sum(axis=1)
+    u = triangles[:, 1] - triangles[:, 0]
+    v = triangles[:, 2] - triangles[:, 0]
+    uu = (u**2).sum(axis=1)
+    vv = (v**2).sum(axis=1)
     twice = 2.0 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
     away = np.column_stack([v[:, 1] * uu - u[:, 1] * vv, u[:, 0] * vv - v[:, 0] * uu])
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -278,7 +286,8 @@ def _circumcentres(triangles: FloatArray) -> FloatArray:
 
 def _outlines(world: World) -> tuple[FloatArray, IntArray]:
     """(V, 2) corners of all objects, then of all obstacles [m], and how many each has."""
-    floes, (vertices, offsets) = world.movables, flatten(keep_out(world).convex_parts)
+    floes = world.movables
+    (vertices, offsets) = flatten(keep_out(world).convex_parts)
     counts = np.concatenate([np.diff(floes.offsets), np.diff(offsets)])
     return np.concatenate([floes.vertices_world, vertices]), counts
 

@@ -11,7 +11,10 @@ from pushplan.ros.ros_messages import Messages
 from pushplan.world import ClearanceArea, GoalDisc, Receptacle, World
 from pushplan.world.checks import FloatArray
 
-_TRIANGLES, _ADD, _DELETE = 11, 0, 2  # of visualization_msgs/Marker: type, and actions
+# of visualization_msgs/Marker: type, and actions
+_TRIANGLES = 11
+_ADD = 0
+_DELETE = 2
 _COLOURS = {
     "robot": (0.2, 0.5, 0.9, 1.0),
     "static": (0.35, 0.35, 0.38, 1.0),
@@ -29,7 +32,9 @@ def scene_markers(messages: Messages, world: World) -> Any:
         area = [goal.center + goal.radius * np.stack([np.cos(_CIRCLE), np.sin(_CIRCLE)], axis=1)]
     elif isinstance(goal, Receptacle | ClearanceArea):
         area = [goal.polygon]
-    base, frame, time = messages.base_frame, messages.frame_id, world.time
+    base = messages.base_frame
+    frame = messages.frame_id
+    time = world.time
     return messages.make(
         "visualization_msgs/MarkerArray",
         markers=[

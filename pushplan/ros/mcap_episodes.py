@@ -73,9 +73,11 @@ def load_episode(path: str | Path) -> Episode:
 def _messages(path: Path) -> Mapping[str, list[Any]]:
     """The messages of our own topics, in the order of their times, and what was lost."""
     library = need("mcap.stream_reader")
-    types, data = RosbagsTypes(), read_bytes(path, "log")
+    types = RosbagsTypes()
+    data = read_bytes(path, "log")
     channels: dict[int, Any] = {}
-    messages, by_topic = [], defaultdict[str, list[Any]](list)
+    messages = []
+    by_topic = defaultdict[str, list[Any]](list)
     with _whole(path):
         for record in _records(library, data):
             kind = type(record).__name__
@@ -129,7 +131,8 @@ def _whole(path: Path) -> Iterator[None]:
 
 
 def _episode(logged: Mapping[str, list[Any]]) -> Episode:
-    first, states = parse_json(logged[WORLD][0].json), logged[STATE]
+    first = parse_json(logged[WORLD][0].json)
+    states = logged[STATE]
     for state in states:
         if state.new_objects:
             first["movables"] += parse_json(state.new_objects)
@@ -150,7 +153,8 @@ def _episode(logged: Mapping[str, list[Any]]) -> Episode:
         actions = np.reshape(end.pop("actions"), (-1, end.pop("action_size")))
         return Episode(world=world, **recorded, actions=actions, **end)
     # a robot's own: from what it saw, and the commands that it got
-    commands, dropped = logged[COMMAND], [int(one["notes"]) for one in logged[DROPPED]]
+    commands = logged[COMMAND]
+    dropped = [int(one["notes"]) for one in logged[DROPPED]]
     last = world.moved(robot_pose=recorded["robot_poses"][-1], movable_poses=poses[-1])
     ended = commands[-1].status if commands else "no command"
     moves_objects = isinstance(world.goal, Receptacle | ClearanceArea)

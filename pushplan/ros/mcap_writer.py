@@ -152,11 +152,13 @@ class McapWriter:
             self._file.close()
 
     def _put_own(self, topic: str, stamp: float, **fields: Any) -> None:
-        kind, header = self._types(TOPICS[topic]), self._messages.header(stamp)
+        kind = self._types(TOPICS[topic])
+        header = self._messages.header(stamp)
         self._put(topic, stamp, kind(header=header, **fields))
 
     def _put(self, topic: str, time: float, message: Any) -> None:
         data = self._types.serialize(message)
-        stamp, number = round(time * 1e9), self._counts[topic]
+        stamp = round(time * 1e9)
+        number = self._counts[topic]
         self._counts[topic] += 1
         self._writer.add_message(self._channels[topic], stamp, data, stamp, number)

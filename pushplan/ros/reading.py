@@ -152,7 +152,8 @@ def twist_from(message: Any) -> Twist:
             turning about z.
     """
     twist = _unstamped(message, "Twist")
-    linear, angular = twist.linear, twist.angular
+    linear = twist.linear
+    angular = twist.angular
     others = (linear.y, linear.z, angular.x, angular.y)
     if not max(abs(value) for value in others) <= _LATERAL:
         raise InvalidInputError(
@@ -185,7 +186,8 @@ def static_map_from(
     """
     _expect(message, "nav_msgs/OccupancyGrid")
     _in_frame(message, frame)
-    height, width = int(message.info.height), int(message.info.width)
+    height = int(message.info.height)
+    width = int(message.info.width)
     cells: NDArray[np.int8] = np.asarray(message.data, dtype=np.int8)
     if height * width != len(cells):
         raise InvalidInputError(
@@ -201,7 +203,10 @@ def static_map_from(
 
 def _heading(q: Any) -> float:
     """Heading [rad] of a quaternion."""
-    x, y, z, w = q.x, q.y, q.z, q.w
+    x = q.x
+    y = q.y
+    z = q.z
+    w = q.w
     given = f"x, y, z, w = {x:g}, {y:g}, {z:g}, {w:g}"
     if not abs(math.sqrt(x * x + y * y + z * z + w * w) - 1.0) <= 1e-3:
         raise InvalidInputError(f"a quaternion must have length 1, got {given}")

@@ -69,7 +69,8 @@ class Messages:
 
     def quaternion(self, theta: float) -> Any:
         """``geometry_msgs/Quaternion`` of a heading [rad]."""
-        z, w = math.sin(0.5 * theta), math.cos(0.5 * theta)
+        z = math.sin(0.5 * theta)
+        w = math.cos(0.5 * theta)
         return self.make("geometry_msgs/Quaternion", x=0.0, y=0.0, z=z, w=w)
 
     def pose(self, pose: ArrayLike) -> Any:

@@ -52,7 +52,9 @@ class DisturbedPolicy:
             "keep_unseen": 6.0 * d.vanish_time if d.vanish > 0.0 else 0.0,
         }
         self._options = {"max_age": 1.0, **known, **runner}
-        self._policy, self._period, self._planning_time = policy, period, planning_time
+        self._policy = policy
+        self._period = period
+        self._planning_time = planning_time
         driven = self._make().policy
         given = driven.actions if isinstance(driven, ChoosesActions) else ()
         self.actions = tuple(given) or ("velocity", "turn_rate")
@@ -69,7 +71,9 @@ class DisturbedPolicy:
         self._inbox: deque[tuple[float, World]] = deque()
         self._applied = driven_twist(world)
         self._hidden = np.zeros(len(world.movables), dtype=np.bool_)
-        self._seen_at, self._acted_at, self._lost = world.time, world.time, False
+        self._seen_at = world.time
+        self._acted_at = world.time
+        self._lost = False
         self._start: World | None = world
         self.runner = None
 
@@ -88,7 +92,8 @@ class DisturbedPolicy:
         return self._actuate(world, command.twist)
 
     def _actuate(self, world: World, twist: Twist) -> Twist:
-        held, self._acted_at = world.time - self._acted_at, world.time
+        held = world.time - self._acted_at
+        self._acted_at = world.time
         lag = self.disturbances.lag
         if lag <= 0.0:
             return twist
@@ -103,10 +108,12 @@ class DisturbedPolicy:
 
     def _see(self, world: World) -> None:
         """Put what perception makes of the world into the inbox, unless it is lost."""
-        d, rng = self.disturbances, self._rng
+        d = self.disturbances
+        rng = self._rng
         if world.time < self._seen_at + 1.0 / d.rate - 1e-9:
             return
-        passed, self._seen_at = world.time - self._seen_at, world.time
+        passed = world.time - self._seen_at
+        self._seen_at = world.time
         if d.loss > 0.0:  # a chain with two states: mean length of a burst, and fraction lost
             again = 1.0 - 1.0 / d.burst if self._lost else d.loss / (d.burst * (1.0 - d.loss))
             self._lost = bool(rng.random() < again)
@@ -116,7 +123,8 @@ class DisturbedPolicy:
 
     def _visible(self, world: World, passed: float) -> BoolArray:
         """(K,) which objects are seen."""
-        d, movables = self.disturbances, world.movables
+        d = self.disturbances
+        movables = world.movables
         if d.vanish <= 0.0:
             return np.ones(len(movables), dtype=np.bool_)
         most = max(int(movables.ids.max(initial=-1)) + 1, len(self._hidden))
@@ -128,12 +136,15 @@ class DisturbedPolicy:
         return ~self._hidden[movables.ids]
 
     def _noisy(self, world: World, visible: BoolArray) -> World:
-        d, rng, movables = self.disturbances, self._rng, world.movables
+        d = self.disturbances
+        rng = self._rng
+        movables = world.movables
         scale = np.array([d.position_noise, d.position_noise, d.heading_noise])
         noise = scale * rng.normal(size=(1 + len(movables), 3))
         poses: FloatArray = movables.poses + noise[1:]
         if d.jump > 0.0 and len(movables) and rng.random() < d.jump:
-            angle, far = rng.uniform(-math.pi, math.pi), d.jump_distance
+            angle = rng.uniform(-math.pi, math.pi)
+            far = d.jump_distance
             far *= world.robot.circumscribed_radius
             poses[rng.integers(len(movables)), :2] += far * np.array(
                 [math.cos(angle), math.sin(angle)]

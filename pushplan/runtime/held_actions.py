@@ -40,7 +40,8 @@ class HeldActions:
 
     def __init__(self, policy: Policy, hold: float) -> None:
         check_world_policy(policy)
-        self._policy, self._hold = policy, hold
+        self._policy = policy
+        self._hold = hold
         given = policy.actions if isinstance(policy, ChoosesActions) else ()
         self.actions = tuple(mode for mode in given if mode in _TWISTS) or _TWISTS
         self.plan_with(ImmediateExecutor())
@@ -49,7 +50,8 @@ class HeldActions:
         """See `pushplan.world.PlansBesideDriving`."""
         self._executor = executor
         self._pending: PendingResult[Any] | None = None
-        self._twist, self._since = Twist(0.0, 0.0), -np.inf
+        self._twist = Twist(0.0, 0.0)
+        self._since = -np.inf
 
     def warm_up(self) -> None:
         """See `pushplan.world.WarmsUp`."""
@@ -75,8 +77,10 @@ class HeldActions:
 
     def _receive(self, world: World) -> None:
         if self._pending is not None and self._pending.ready(world.time):
-            pending, self._pending = self._pending, None
-            self._twist, self._since = twist_of(world, pending.result()), world.time
+            pending = self._pending
+            self._pending = None
+            self._twist = twist_of(world, pending.result())
+            self._since = world.time
 
 
 def check_world_policy(policy: Policy) -> None:

@@ -58,7 +58,8 @@ class Motors:
         period: float,
         timeout: float = 0.5,
     ) -> None:
-        self._send, self._robot = send, expect("robot", robot, RobotModel)
+        self._send = send
+        self._robot = expect("robot", robot, RobotModel)
         self._period = number("period", period, low=0.0, open_low=True)
         self._timeout = number("timeout", timeout, low=0.0, open_low=True)
         self.twist = Twist(0.0, 0.0)

@@ -100,7 +100,8 @@ def _surer_goal(goal: ManipulationGoal, static: StaticMap, inset: float) -> Mani
 
 def _with_edges_moved(corners: FloatArray, normals: FloatArray, by: FloatArray) -> FloatArray:
     """(N, 2) corners of a convex outline after each edge has moved along its normal by (N,) [m]."""
-    before, moved = np.roll(normals, 1, axis=0), np.roll(by, 1)
+    before = np.roll(normals, 1, axis=0)
+    moved = np.roll(by, 1)
     turn = before[:, 0] * normals[:, 1] - before[:, 1] * normals[:, 0]
     x = moved * normals[:, 1] - by * before[:, 1]
     y = by * before[:, 0] - moved * normals[:, 0]

@@ -48,7 +48,8 @@ class ObstacleGuard:
     """
 
     def __init__(self, allowance: NoiseAllowance, period: float) -> None:
-        self._allowance, self._period = allowance, period
+        self._allowance = allowance
+        self._period = period
 
     def reset(self, world: World) -> None:
         """Take all that a world holds as known."""
@@ -119,14 +120,17 @@ class ObstacleGuard:
 
     def _paths(self, world: World, twist: Twist) -> list[tuple[int, FloatArray]]:
         """Where a command may lead to: (N, 3) to a stand, or around the circle of either side."""
-        robot, held = world.robot, _HELD * self._period
+        robot = world.robot
+        held = _HELD * self._period
         if robot.can_stop:
             return [(0, stopping_path(robot, world.robot_pose, twist, held, self._period))]
         return [(side, self._circle(world, twist, side)) for side in (1, -1)]
 
     def _circle(self, world: World, twist: Twist, side: int) -> FloatArray:
         """(N, 3) poses of a command, and of the tightest circle to the left (1) or right (-1)."""
-        robot, held, rate = world.robot, _HELD * self._period, side * world.robot.max_turn_rate
+        robot = world.robot
+        held = _HELD * self._period
+        rate = side * world.robot.max_turn_rate
         step = max(self._period, abs(rate) / robot.max_turn_acceleration / _TURNING_STEPS)
         fine = _FINE * robot.circumscribed_radius
         poses = [np.array(world.robot_pose)]
@@ -148,7 +152,8 @@ class ObstacleGuard:
         boxes = outline_boxes(*flatten(outlines))
         path = np.concatenate([path for _, path in self._paths(world, twist)])
         reach = world.robot.circumscribed_radius + 2.0 * _RESUMED * self._clearance(world)
-        low, high = path[:, :2].min(axis=0) - reach, path[:, :2].max(axis=0) + reach
+        low = path[:, :2].min(axis=0) - reach
+        high = path[:, :2].max(axis=0) + reach
         near = ((boxes[:, 2:] >= low) & (boxes[:, :2] <= high)).all(axis=1)
         return [part for part, is_near in zip(outlines, near, strict=True) if is_near]
 
@@ -167,7 +172,8 @@ class _Closeness:
     """
 
     def __init__(self, shape: Footprint, pose: FloatArray, outlines: list[FloatArray]) -> None:
-        self._shape, self._scratch = shape, np.empty_like(shape.vertices)
+        self._shape = shape
+        self._scratch = np.empty_like(shape.vertices)
         self._too_near: list[tuple[ConvexObstacles, float]] = []
         clear = []
         for outline in outlines:

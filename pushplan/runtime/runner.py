@@ -143,7 +143,8 @@ class Runner:
             self.policy.expect_noise(left * noise[0], left * noise[1])
         self._believed = max(self.max_age, _BLIND if self.on_stale == "continue" else 0.0)
         self._estimator = StateEstimator(delay, gain, self._believed)
-        self._delay, self._log = delay, log
+        self._delay = delay
+        self._log = log
         self._executor = executor or ThreadExecutor(self.plan_stop, clock)
         self._lock = threading.Lock()  # of the snapshots that have come in, and their counts
         self._prompt = False
@@ -159,7 +160,8 @@ class Runner:
         self._clock_read = False
         self._stepped = self._refused = ""
         self._cancelled = ""
-        self._done, self._surely_done = 0, False
+        self._done = 0
+        self._surely_done = False
         self._last: Command | None = None
         self._plan: Plan | None = None
         self._planned_at = self._retry_at = -math.inf
@@ -192,7 +194,8 @@ class Runner:
         self._estimator.warm_up(world)
         with self._lock:
             self._forget()
-            self._newest, self.worlds = world, 1
+            self._newest = world
+            self.worlds = 1
         self._guard.reset(world)
         self._restart(world)
         if not self._is_planning:  # else as soon as the call of the last episode has returned
@@ -275,7 +278,8 @@ class Runner:
             if not fresh:
                 return self._newest
             fresh.sort(key=lambda world: world.time)
-            self._newest, self._refused = fresh[-1], ""
+            self._newest = fresh[-1]
+            self._refused = ""
         for world in fresh:
             self._note("world", world)
         seen = self._guard.observe(fresh[-1])
@@ -338,11 +342,13 @@ class Runner:
         before = driven_twist(newest) if last is None else last.twist
         twist, obstacle = self._guard.limited(world, before, wanted, held)
         if obstacle and status in (CommandStatus.DRIVING, CommandStatus.WAITING):
-            status, reason = CommandStatus.BLOCKED, obstacle
+            status = CommandStatus.BLOCKED
+            reason = obstacle
         self._estimator.sent(at, twist)
         plan = self.policy.current_plan if isinstance(self.policy, ShowsPlan) else None
         if plan is not self._plan:
-            self._plan, self._planned_at = plan, at
+            self._plan = plan
+            self._planned_at = at
             if plan is not None:
                 self._note("plan", plan, at)
         command = Command(
@@ -358,7 +364,9 @@ class Runner:
         self._note("command", command)
         if math.isfinite(now) and now != at:
             command = replace(command, time=now)
-        self._last, self.status, self._at = command, status, at
+        self._last = command
+        self.status = status
+        self._at = at
         return command
 
     def _read_clock(self, now: float) -> tuple[float, str]:
@@ -366,10 +374,12 @@ class Runner:
         if not math.isfinite(now):
             self._clock_read = False
             return self._at + self.period, f"the clock of the commands says {now:g} s"
-        at, last = now + self._shift, self._last
+        at = now + self._shift
+        last = self._last
         if last is None:
             return at, ""
-        first, self._clock_read = not self._clock_read, True
+        first = not self._clock_read
+        self._clock_read = True
         back = self._at - at
         if back < 0.0:
             return at, self._stepped
@@ -405,7 +415,8 @@ class Runner:
         if age > self._believed:
             old = f"the newest world is {age:.3g} s old{self._refused}"
             return None, CommandStatus.STALE, old
-        running, budget = self._running_s, self.plan_stop.seconds
+        running = self._running_s
+        budget = self.plan_stop.seconds
         if running > 2.0 * budget + 0.5:
             reason = f"a planning call has run for {running:.2g} s, its rule allows {budget:g} s"
             return None, CommandStatus.FAILED, reason
@@ -419,7 +430,8 @@ class Runner:
             wanted = expect("the action of the policy", self.policy.act(world, None), Twist)
         except Exception as error:
             self.failures += 1
-            self._failure, self._retry_at = describe(error), now + _RETRY
+            self._failure = describe(error)
+            self._retry_at = now + _RETRY
             self._drop_plans()
             return None, CommandStatus.FAILED, self._failure
         if wanted.linear == 0.0 == wanted.angular:

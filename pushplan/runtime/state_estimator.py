@@ -34,7 +34,9 @@ class StateEstimator:
     """
 
     def __init__(self, delay: float, gain: float, horizon: float) -> None:
-        self._delay, self._gain, self._horizon = delay, gain, delay + horizon
+        self._delay = delay
+        self._gain = gain
+        self._horizon = delay + horizon
         self._sent: deque[tuple[float, Twist]] = deque()
         self._world: World | None = None
         self._ahead: World | None = None
@@ -84,8 +86,10 @@ class StateEstimator:
         path = self._path(world, time)
         if len(path) == 1:
             return world.moved(time=time)
-        twist, heading = self._driven(time), float(path[-1, 2])
-        vx, vy = twist.linear * math.cos(heading), twist.linear * math.sin(heading)
+        twist = self._driven(time)
+        heading = float(path[-1, 2])
+        vx = twist.linear * math.cos(heading)
+        vy = twist.linear * math.sin(heading)
         return world.moved(
             robot_pose=path[-1],
             robot_twist=[vx, vy, twist.angular],
@@ -101,7 +105,8 @@ class StateEstimator:
         poses = [np.array(world.robot_pose)]
         for begin, end in itertools.pairwise(edges):
             twist = self._driven(0.5 * (begin + end))
-            length, turn = twist.linear * (end - begin), twist.angular * (end - begin)
+            length = twist.linear * (end - begin)
+            turn = twist.angular * (end - begin)
             add_arc(poses, length, turn, size)
         return np.array(poses)
 
@@ -112,7 +117,8 @@ class StateEstimator:
 
     def _blend(self, predicted: World, seen: World) -> World:
         """Between what was predicted and what is seen."""
-        old, new = predicted.movables, seen.movables
+        old = predicted.movables
+        new = seen.movables
         poses = np.array(new.poses)
         _, here, there = np.intersect1d(new.ids, old.ids, return_indices=True)
         poses[here] = self._between(old.poses[there], new.poses[here])
@@ -130,13 +136,15 @@ def _pushed(world: World, path: FloatArray) -> FloatArray | None:
     movables = world.movables
     if not len(movables):
         return None
-    low, high = path[:, :2].min(axis=0), path[:, :2].max(axis=0)
+    low = path[:, :2].min(axis=0)
+    high = path[:, :2].max(axis=0)
     reach = _REACH * world.robot.circumscribed_radius + movables.radii[:, None]
     places = movables.poses[:, :2]
     near = ((places > low - reach) & (places < high + reach)).all(axis=1)
     if not near.any():
         return None
-    solid, poses = world.with_fixed_as_static(), np.array(movables.poses)
+    solid = world.with_fixed_as_static()
+    poses = np.array(movables.poses)
     poses[~movables.fixed] = default_interaction(solid).sweep(solid, path).object_poses[-1]
     return poses
 

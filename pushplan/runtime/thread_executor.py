@@ -34,7 +34,8 @@ class ThreadExecutor:
     takes_time = True
 
     def __init__(self, stop: Stop, clock: Callable[[], float]) -> None:
-        self._stop, self._clock = stop, clock
+        self._stop = stop
+        self._clock = clock
         self._took = ExpectedTime()
         self._worker = _Worker()
         weakref.finalize(self, self._worker.calls.put, None)  # an executor that nobody closes
@@ -145,9 +146,11 @@ class ThreadCall(Generic[T]):
     """
 
     def __init__(self, call: Callable[[Stop], T], stop: Stop, began: float) -> None:
-        self.began, self.ended = began, False
+        self.began = began
+        self.ended = False
         self._token = Cancellation()
-        self._call, self._rule = call, stop | self._token
+        self._call = call
+        self._rule = stop | self._token
         self._result: T | None = None
         self._error: BaseException | None = None
         self._done = False

@@ -24,20 +24,27 @@ class IceWater(NamedTuple):
 @kernel
 def nearest_point(x: float, y: float, polygon: FloatArray) -> tuple[float, float, float]:
     """Distance [m] of a point to a convex polygon and its nearest point; 0 and itself inside."""
-    best, bx, by = math.inf, x, y
+    best = math.inf
+    bx = x
+    by = y
     inside = True
     n = polygon.shape[0]
     for a in range(n):
         b = a + 1 if a + 1 < n else 0
-        ex, ey = polygon[b, 0] - polygon[a, 0], polygon[b, 1] - polygon[a, 1]
-        px, py = x - polygon[a, 0], y - polygon[a, 1]
+        ex = polygon[b, 0] - polygon[a, 0]
+        ey = polygon[b, 1] - polygon[a, 1]
+        px = x - polygon[a, 0]
+        py = y - polygon[a, 1]
         if ex * py - ey * px < 0.0:
             inside = False
         t = min(1.0, max(0.0, (ex * px + ey * py) / (ex * ex + ey * ey)))
-        qx, qy = polygon[a, 0] + t * ex, polygon[a, 1] + t * ey
+        qx = polygon[a, 0] + t * ex
+        qy = polygon[a, 1] + t * ey
         d = math.hypot(x - qx, y - qy)
         if d < best:
-            best, bx, by = d, qx, qy
+            best = d
+            bx = qx
+            by = qy
     if inside:
         return 0.0, x, y
     return best, bx, by
@@ -68,24 +75,38 @@ class Outlines(NamedTuple):
 @kernel(allocates=True)
 def cut_cells(discs: Discs, water: IceWater) -> Outlines:
     """Cells of a power diagram (Laguerre tessellation), half a gap smaller on every side [m]."""
-    box, centres, radii = water.box, discs.centres, discs.radii
+    box = water.box
+    centres = discs.centres
+    radii = discs.radii
     count = centres.shape[0]
     cells = Outlines(np.empty((count, CAPACITY, 2)), np.zeros(count, np.int64))
     spare = np.empty((CAPACITY, 2))
     for k in range(count):
-        x, y, r = centres[k, 0], centres[k, 1], discs.reaches[k]
+        x = centres[k, 0]
+        y = centres[k, 1]
+        r = discs.reaches[k]
         cell = cells.corners[k]
-        x0, y0 = max(box[0], x - r), max(box[1], y - r)
-        x1, y1 = min(box[2], x + r), min(box[3], y + r)
-        cell[0, 0], cell[0, 1], cell[1, 0], cell[1, 1] = x0, y0, x1, y0
-        cell[2, 0], cell[2, 1], cell[3, 0], cell[3, 1] = x1, y1, x0, y1
+        x0 = max(box[0], x - r)
+        y0 = max(box[1], y - r)
+        x1 = min(box[2], x + r)
+        y1 = min(box[3], y + r)
+        cell[0, 0] = x0
+        cell[0, 1] = y0
+        cell[1, 0] = x1
+        cell[1, 1] = y0
+        cell[2, 0] = x1
+        cell[2, 1] = y1
+        cell[3, 0] = x0
+        cell[3, 1] = y1
         n = 4
         for q in range(discs.neighbour_offsets[k], discs.neighbour_offsets[k + 1]):
             other = discs.neighbours[q]
-            dx, dy = centres[other, 0] - x, centres[other, 1] - y
+            dx = centres[other, 0] - x
+            dy = centres[other, 1] - y
             far = math.hypot(dx, dy)
             away = 0.5 * (far + (radii[k] ** 2 - radii[other] ** 2) / far - water.gap)
-            ux, uy = dx / far, dy / far
+            ux = dx / far
+            uy = dy / far
             n = _clip(cell, n, ux, uy, ux * x + uy * y + away, spare)
         for b in range(water.block_offsets.shape[0] - 1):
             block = water.blocks[water.block_offsets[b] : water.block_offsets[b + 1]]
@@ -93,7 +114,8 @@ def cut_cells(discs: Discs, water: IceWater) -> Outlines:
             if far == 0.0:
                 n = 0
                 break
-            ux, uy = (bx - x) / far, (by - y) / far
+            ux = (bx - x) / far
+            uy = (by - y) / far
             n = _clip(cell, n, ux, uy, ux * bx + uy * by - water.gap, spare)
         cells.counts[k] = n
     return cells
@@ -117,7 +139,8 @@ def _clip(
         a = ux * corners[i, 0] + uy * corners[i, 1] - bound
         b = ux * corners[j, 0] + uy * corners[j, 1] - bound
         if a <= 0.0 and m < spare.shape[0]:
-            spare[m, 0], spare[m, 1] = corners[i, 0], corners[i, 1]
+            spare[m, 0] = corners[i, 0]
+            spare[m, 1] = corners[i, 1]
             m += 1
         if (a < 0.0 < b or b < 0.0 < a) and m < spare.shape[0]:
             t = a / (a - b)
@@ -140,14 +163,17 @@ def _cut_out(
     """A scaled shape about a place within a convex cell; its number of corners."""
     n: int = shape.shape[0]
     for i in range(n):
-        out[i, 0], out[i, 1] = centre[0] + scale * shape[i, 0], centre[1] + scale * shape[i, 1]
+        out[i, 0] = centre[0] + scale * shape[i, 0]
+        out[i, 1] = centre[1] + scale * shape[i, 1]
     for i in range(cell.shape[0]):
         j = i + 1 if i + 1 < cell.shape[0] else 0
-        ux, uy = cell[j, 1] - cell[i, 1], cell[i, 0] - cell[j, 0]
+        ux = cell[j, 1] - cell[i, 1]
+        uy = cell[i, 0] - cell[j, 0]
         long = math.hypot(ux, uy)
         if long == 0.0:
             continue
-        ux, uy = ux / long, uy / long
+        ux = ux / long
+        uy = uy / long
         n = _clip(out, n, ux, uy, ux * cell[i, 0] + uy * cell[i, 1], spare)
     return n
 
@@ -167,10 +193,13 @@ def fit_floes(
     for k in range(count):
         if cells.counts[k] == 0:
             continue
-        at, shape = centres[k], shapes.corners[k, : shapes.counts[k]]
-        cell, floe = cells.corners[k, : cells.counts[k]], floes.corners[k]
+        at = centres[k]
+        shape = shapes.corners[k, : shapes.counts[k]]
+        cell = cells.corners[k, : cells.counts[k]]
+        floe = floes.corners[k]
         unit = math.sqrt(targets[k])
-        low, high = unit, unit
+        low = unit
+        high = unit
         n = _cut_out(shape, unit, at, cell, floe, spare)
         if n == 0 or polygon_area(floe[:n]) < targets[k]:
             high = stretch * unit
@@ -190,12 +219,14 @@ def fit_floes(
 def _simplify(corners: FloatArray, n: int, shortest: float) -> int:
     """Leave out corners, in place, while an edge is shorter than ``shortest`` [m]; their number."""
     while n > 3:
-        best, at = shortest, -1
+        best = shortest
+        at = -1
         for i in range(n):
             j = i + 1 if i + 1 < n else 0
             d = math.hypot(corners[j, 0] - corners[i, 0], corners[j, 1] - corners[i, 1])
             if d < best:
-                best, at = d, i
+                best = d
+                at = i
         if at < 0:
             break
         # of its two ends the one whose loss costs the smaller triangle
@@ -203,7 +234,8 @@ def _simplify(corners: FloatArray, n: int, shortest: float) -> int:
         if _loss(corners, n, after) < _loss(corners, n, at):
             at = after
         for i in range(at, n - 1):
-            corners[i, 0], corners[i, 1] = corners[i + 1, 0], corners[i + 1, 1]
+            corners[i, 0] = corners[i + 1, 0]
+            corners[i, 1] = corners[i + 1, 1]
         n -= 1
     return n
 
@@ -211,9 +243,12 @@ def _simplify(corners: FloatArray, n: int, shortest: float) -> int:
 @kernel
 def _loss(corners: FloatArray, n: int, i: int) -> float:
     """Area [m²] that a polygon loses with corner ``i``."""
-    a, b = (i - 1) % n, (i + 1) % n
-    ux, uy = corners[i, 0] - corners[a, 0], corners[i, 1] - corners[a, 1]
-    vx, vy = corners[b, 0] - corners[a, 0], corners[b, 1] - corners[a, 1]
+    a = (i - 1) % n
+    b = (i + 1) % n
+    ux = corners[i, 0] - corners[a, 0]
+    uy = corners[i, 1] - corners[a, 1]
+    vx = corners[b, 0] - corners[a, 0]
+    vy = corners[b, 1] - corners[a, 1]
     return float(0.5 * abs(ux * vy - uy * vx))
 
 
@@ -235,11 +270,14 @@ def place_discs(
 ) -> FloatArray:
     """(J, 2) centres [m] of the first J discs, which found a place; K - J did not."""
     box = water.box
-    count, tries = draws.shape[0], draws.shape[1]
-    width, height = box[2] - box[0], box[3] - box[1]
+    count = draws.shape[0]
+    tries = draws.shape[1]
+    width = box[2] - box[0]
+    height = box[3] - box[1]
     rows, cols = density.shape
     side = 2.0 * radii[0] + water.gap
-    nx, ny = max(1, int(width / side)), max(1, int(height / side))
+    nx = max(1, int(width / side))
+    ny = max(1, int(height / side))
     buckets = _Buckets(
         np.full((ny, nx), -1, np.int64), np.full(count, -1, np.int64), np.empty((count, 2)), radii
     )
@@ -247,7 +285,8 @@ def place_discs(
         r = radii[k]
         done = False
         for t in range(tries):
-            u, v = draws[k, t, 0], draws[k, t, 1]
+            u = draws[k, t, 0]
+            v = draws[k, t, 1]
             x = box[0] + r + u * max(0.0, width - 2.0 * r)
             y = box[1] + r + v * max(0.0, height - 2.0 * r)
             chance = density[
@@ -262,7 +301,8 @@ def place_discs(
             reach = r + water.gap
             if _touches_disc(x, y, reach, i, j, buckets) or _touches_block(x, y, reach, water):
                 continue
-            buckets.centres[k, 0], buckets.centres[k, 1] = x, y
+            buckets.centres[k, 0] = x
+            buckets.centres[k, 1] = y
             buckets.following[k] = buckets.head[j, i]
             buckets.head[j, i] = k
             done = True
@@ -275,12 +315,14 @@ def place_discs(
 @kernel
 def _touches_disc(x: float, y: float, reach: float, i: int, j: int, buckets: _Buckets) -> bool:
     """Whether a disc of radius ``reach`` in column i and row j overlaps a placed one."""
-    head, centres = buckets.head, buckets.centres
+    head = buckets.head
+    centres = buckets.centres
     for row in range(max(0, j - 1), min(head.shape[0], j + 2)):
         for col in range(max(0, i - 1), min(head.shape[1], i + 2)):
             q = head[row, col]
             while q >= 0:
-                dx, dy = centres[q, 0] - x, centres[q, 1] - y
+                dx = centres[q, 0] - x
+                dy = centres[q, 1] - y
                 far = reach + buckets.radii[q]
                 if dx * dx + dy * dy < far * far:
                     return True

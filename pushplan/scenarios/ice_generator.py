@@ -173,7 +173,8 @@ def _random_shapes(rng: np.random.Generator, count: int) -> Outlines:
     jitter = np.take_along_axis(jitter, place, axis=1)
     angles = 2.0 * np.pi * (place + jitter) / numbers[:, None] + turns[:, :1]
     points = np.stack([slender[:, None] * np.cos(angles), np.sin(angles)], axis=2)
-    c, s = np.cos(turns[:, 1]), np.sin(turns[:, 1])
+    c = np.cos(turns[:, 1])
+    s = np.sin(turns[:, 1])
     rotation = np.stack([np.stack([c, s], axis=1), np.stack([-s, c], axis=1)], axis=1)
     points = points @ rotation
     after = np.roll(points, -1, axis=1)

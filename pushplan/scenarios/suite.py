@@ -83,7 +83,8 @@ def distinct(suites: Sequence[Suite]) -> tuple[Suite, ...]:
     known: dict[str, list[Scenario]] = {}
     found = []
     for given in suites:
-        one, number = given, 1
+        one = given
+        number = 1
         if given.name.split("[")[0] not in _table():
             one = given.as_one_setting()
             while known.setdefault(one.name, one.starts) != one.starts:

@@ -20,9 +20,14 @@ from pushplan.compiled import KernelByType, kernel
 from pushplan.search.heap import pop_least, push_or_lift
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
-EXHAUSTED, FOUND, PAUSED = 0, 1, 2
+EXHAUSTED = 0
+FOUND = 1
+PAUSED = 2
 """What `AStar.run` returns: no path exists; the goal was reached; the budget was used up."""
-SIZE, EXPANDED, GENERATED, GOAL = 0, 1, 2, 3
+SIZE = 0
+EXPANDED = 1
+GENERATED = 2
+GOAL = 3
 """Entries of `SearchState.counters`."""
 
 

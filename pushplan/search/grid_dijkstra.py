@@ -36,9 +36,12 @@ class GridSearch(NamedTuple):
 @kernel(allocates=True)
 def new_grid_search(rows: int, cols: int, starts: IntArray) -> GridSearch:
     """A search that begins at cells ``starts`` (S,), counted row by row."""
-    costs, counters = np.full((rows, cols), np.inf), np.zeros(2, np.int64)
-    parents, places = np.full(rows * cols, -1, np.int64), np.full(rows * cols, -1, np.int64)
-    order, heap = np.empty(rows * cols, np.int64), np.empty(rows * cols, np.int64)
+    costs = np.full((rows, cols), np.inf)
+    counters = np.zeros(2, np.int64)
+    parents = np.full(rows * cols, -1, np.int64)
+    places = np.full(rows * cols, -1, np.int64)
+    order = np.empty(rows * cols, np.int64)
+    heap = np.empty(rows * cols, np.int64)
     keys = np.empty(rows * cols)
     for at in starts:
         costs[at // cols, at % cols] = 0.0
@@ -59,14 +62,16 @@ def settle_cells(
     rows, cols = weights.shape
     while counters[0] > 0 and counters[1] < upto:
         at = pop_least(keys, heap, places, counters)
-        r, c = at // cols, at % cols
+        r = at // cols
+        c = at % cols
         order[counters[1]] = at
         counters[1] += 1
         if goals[r, c]:
             return False
         for dr in range(-1, 2):
             for dc in range(-1, 2):
-                nr, nc = r + dr, c + dc
+                nr = r + dr
+                nc = c + dc
                 if nr < 0 or nc < 0 or nr >= rows or nc >= cols or np.isinf(weights[nr, nc]):
                     continue
                 length = cell * np.sqrt(float(dr * dr + dc * dc))
@@ -86,7 +91,8 @@ def grid_dijkstra(
     stopped: Callable[[], bool] = lambda: False,  # ends the search, asked every few milliseconds
 ) -> tuple[FloatArray, IntArray, IntArray]:
     """Costs (rows, columns), parents, and settled cells in order, the first goal last; -1: none."""
-    search, upto = new_grid_search(weights.shape[0], weights.shape[1], starts), _PIECE
+    search = new_grid_search(weights.shape[0], weights.shape[1], starts)
+    upto = _PIECE
     while settle_cells(search, weights, goals, cell, upto) and not stopped():
         upto += _PIECE
     return search.costs, search.parents, search.order[: search.counters[1]]

@@ -31,10 +31,12 @@ def push_or_lift(
         above = (at - 1) >> 1
         if not _before(key, node, keys[above], heap[above]):
             break
-        keys[at], heap[at] = keys[above], heap[above]
+        keys[at] = keys[above]
+        heap[at] = heap[above]
         places[heap[at]] = at
         at = above
-    keys[at], heap[at] = key, node
+    keys[at] = key
+    heap[at] = node
     places[node] = at
 
 
@@ -52,10 +54,12 @@ def _sink(
             below = right
         if not _before(keys[below], heap[below], key, node):
             break
-        keys[at], heap[at] = keys[below], heap[below]
+        keys[at] = keys[below]
+        heap[at] = heap[below]
         places[heap[at]] = at
         at = below
-    keys[at], heap[at] = key, node
+    keys[at] = key
+    heap[at] = node
     places[node] = at
 
 

@@ -44,12 +44,14 @@ class PlanCount:
 
     def __init__(self) -> None:
         self._plan: Plan | None = None
-        self._number, self._since = 0, 0.0
+        self._number = 0
+        self._since = 0.0
 
     def fields(self, plan: Plan | None, time: float, with_plan: bool) -> dict[str, Any]:
         """What a reply says of the plan that is followed at a time [s]."""
         if plan is not self._plan:
-            self._plan, self._since = plan, time
+            self._plan = plan
+            self._since = time
             self._number += plan is not None
         known = {
             "plan_number": 0 if plan is None else self._number,

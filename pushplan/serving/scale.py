@@ -27,7 +27,9 @@ def check_scale(world: World) -> None:
     Raises:
         InvalidInputError: naming what is, the number, and the greatest one.
     """
-    static, goal, robot = world.static, world.goal, world.robot
+    static = world.static
+    goal = world.goal
+    robot = world.robot
     _within("static.bounds", static.bounds, FARTHEST, "m")
     for name, lines in (("static.polygons", static.polygons), ("robot.parts", robot.contact_parts)):
         for line in lines:
@@ -66,7 +68,8 @@ def check_motion(world: World) -> None:
     assert world.robot_twist is not None
     _within("robot_pose", world.robot_pose, FARTHEST, "m, rad")
     _within("robot_twist", world.robot_twist, FASTEST, "m/s, rad/s")
-    radius, reach = world.robot.circumscribed_radius, world.static.bounds.reshape(2, 2)
+    radius = world.robot.circumscribed_radius
+    reach = world.static.bounds.reshape(2, 2)
     corners = np.vstack([reach, world.robot_pose[:2], _goal_points(world)])
     wide = float((corners.max(axis=0) - corners.min(axis=0)).max())
     if wide > WIDEST * radius:
@@ -87,7 +90,8 @@ def _goal_points(world: World) -> FloatArray:
 
 def _within(name: str, values: ArrayLike, most: float, unit: str, least: float = 0.0) -> None:
     sizes: FloatArray = np.abs(values)
-    largest, smallest = sizes.max(initial=0.0), sizes.min(initial=np.inf)
+    largest = sizes.max(initial=0.0)
+    smallest = sizes.min(initial=np.inf)
     if largest > most:
         raise InvalidInputError(f"{name} must be at most {most:g} [{unit}], got {largest:g}")
     if smallest < least:

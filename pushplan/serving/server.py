@@ -82,7 +82,8 @@ class PolicyServer:
     ) -> None:
         if isinstance(policy, str):
             name = policy
-            label, policy = label or name, lambda: make_policy(name)
+            label = label or name
+            policy = partial(make_policy, name)
         if not callable(policy):
             raise InvalidInputError(
                 f"policy must be a name or a callable that makes one, got {short(policy)}"
@@ -243,7 +244,9 @@ class PolicyServer:
         """Answer message after message, then end planning; why it is sent away, if it is."""
         thread = f"pushplan client {number}"
         LOG.info("client %d has come", number)
-        why, refusal, last = "closed", "", False
+        why = "closed"
+        refusal = ""
+        last = False
         try:
             while not last:
                 body = await connection.read()

@@ -51,7 +51,9 @@ class Session:
     """
 
     def __init__(self, make_policy: Callable[[], Policy], label: str, limits: ServerLimits) -> None:
-        self._make_policy, self._label, self._limits = make_policy, label, limits
+        self._make_policy = make_policy
+        self._label = label
+        self._limits = limits
         self._feed = WorldFeed()
         self._settings: Fields = {}
         self._episode: StepEpisode | LoopEpisode | None = None
@@ -64,7 +66,8 @@ class Session:
         leaves the known world as it was.
         """
         kind: str | None = None
-        before, self.busy = copy(self._feed), True
+        before = copy(self._feed)
+        self.busy = True
         try:
             request = messages.decode(body)
             kind = request["type"]
@@ -117,7 +120,8 @@ class Session:
         policy = self._make_policy()
         check_world_policy(policy)
         settings = check_settings(policy, request.get("settings", {}))
-        self._feed, self._settings = feed, {"period": period, **settings}
+        self._feed = feed
+        self._settings = {"period": period, **settings}
         self.greeted = True
         goals = _GOALS.get(getattr(policy, "goal_kind", ""), sum(_GOALS.values(), ()))
         return {
@@ -167,7 +171,8 @@ class Session:
             raise
 
     def _act(self, request: Fields) -> Fields:
-        episode, with_plan = self._running(StepEpisode), _with_plan(request)
+        episode = self._running(StepEpisode)
+        with_plan = _with_plan(request)
         return episode.act(self._feed.next(request), with_plan)
 
     def _update(self, request: Fields) -> Fields:
@@ -175,7 +180,8 @@ class Session:
         return episode.update(self._feed.next(request))
 
     def _command(self, request: Fields) -> Fields:
-        episode, now = self._running(LoopEpisode), number("now", request["now"])
+        episode = self._running(LoopEpisode)
+        now = number("now", request["now"])
         return episode.command(now, _with_plan(request))
 
     def _cancel(self, request: Fields) -> Fields:

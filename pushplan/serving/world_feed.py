@@ -46,7 +46,8 @@ class WorldFeed:
                 file.
         """
         if isinstance(data, Mapping):
-            static, robot = data.get("static"), data.get("robot")
+            static = data.get("static")
+            robot = data.get("robot")
             if isinstance(static, Mapping) and ("map" in static or "unknown" in static):
                 raise SchemaError(
                     "static.map names a file, which a message must not: give obstacles as "
@@ -78,7 +79,8 @@ class WorldFeed:
         return self._changed(self._world, message)
 
     def _changed(self, world: World, message: Mapping[str, Any]) -> World:
-        seen, known = self._seen(world.movables, message), self._known
+        seen = self._seen(world.movables, message)
+        known = self._known
         if "added" in message:
             added = movables_from_list(message["added"])
             for one in added.ids.tolist():
@@ -88,7 +90,8 @@ class WorldFeed:
                         "'poses', or a whole 'world' if its outline has changed"
                     )
             check_shapes(added)
-            seen, known = seen.updated(added), known.updated(added)
+            seen = seen.updated(added)
+            known = known.updated(added)
         world = replace(
             world,
             time=message["time"],

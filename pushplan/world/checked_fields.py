@@ -67,7 +67,8 @@ class CheckedFields:
 
     def __post_init__(self) -> None:
         kind: Any = type(self)
-        values, sides = self.__dict__, dict[str | int | None, int]()
+        values = self.__dict__
+        sides = dict[str | int | None, int]()
         for name, called, check, optional, shape in _checks(kind):
             value = values[name]
             if optional and value is None:

@@ -147,7 +147,8 @@ class ClearanceArea(_ObjectGoal):
         """(K,) which of several objects are cleared: some edge's line separates them strictly."""
         if len(offsets) == 1:
             return np.zeros(0, dtype=bool)
-        starts, after = offsets[:-1], next_corner(offsets)
+        starts = offsets[:-1]
+        after = next_corner(offsets)
         mine = _gaps(self.polygon, np.roll(self.polygon, -1, axis=0), vertices)  # (V, N)
         from_area = np.minimum.reduceat(mine, starts).max(axis=1)  # (K,)
         theirs = _gaps(vertices, vertices[after], self.polygon).min(axis=0)  # (V,)
@@ -157,7 +158,8 @@ class ClearanceArea(_ObjectGoal):
 
 def _gaps(a: FloatArray, b: FloatArray, points: FloatArray) -> FloatArray:
     """(P, E) distance [m] of each of (P, 2) points in front of each edge from (E, 2) a to b."""
-    nx, ny = b[:, 1] - a[:, 1], a[:, 0] - b[:, 0]
+    nx = b[:, 1] - a[:, 1]
+    ny = a[:, 0] - b[:, 0]
     length = np.sqrt(nx * nx + ny * ny)
     x, y = (points[:, None] - a).transpose(2, 0, 1)
     gaps: FloatArray = x * (nx / length) + y * (ny / length)

@@ -75,7 +75,8 @@ def occupancy_polygons(
     points = _placed(place, side * corners)
     rows, columns = full.shape
     rim = _placed(place, side * np.array([[0, 0], [columns, 0], [columns, rows], [0, rows]]))
-    low, high = rim.min(axis=0), rim.max(axis=0)
+    low = rim.min(axis=0)
+    high = rim.max(axis=0)
     polygons = list(points.reshape(-1, 4, 2))
     if beyond:
         box = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
@@ -117,10 +118,12 @@ def rectangle_cover(occupied: BoolArray) -> IntArray:
         InvalidInputError: if there are more than `MOST_RECTANGLES`.
     """
     full = np.pad(occupied, 1)  # free cells all round end every run
-    by_row, by_column = _counts(full), _counts(full.T)
+    by_row = _counts(full)
+    by_column = _counts(full.T)
     left = full.copy()
     flat = left.reshape(-1)
-    columns, at = full.shape[1], 0
+    columns = full.shape[1]
+    at = 0
     found: list[tuple[int, int, int, int]] = []
     while True:
         at += int(flat[at:].argmax())
@@ -133,7 +136,8 @@ def rectangle_cover(occupied: BoolArray) -> IntArray:
         r0, r1 = _run(full[:, column], row)
         c0, c1 = _run(by_column[r1] - by_column[r0] == r1 - r0, column)
         if (r0, c0, r1, c1) != best:
-            wide, tall = left[best[0] : best[2], best[1] : best[3]], left[r0:r1, c0:c1]
+            wide = left[best[0] : best[2], best[1] : best[3]]
+            tall = left[r0:r1, c0:c1]
             if np.count_nonzero(tall) > np.count_nonzero(wide):
                 best = r0, c0, r1, c1
         left[best[0] : best[2], best[1] : best[3]] = False

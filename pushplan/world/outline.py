@@ -26,14 +26,16 @@ def signed_area(corners: FloatArray) -> float:
         corners: (N, 2) corners [m], in order.
     """
     shifted = corners - corners[0]  # far from the origin the plain formula loses digits
-    x, y = shifted[:, 0], shifted[:, 1]
+    x = shifted[:, 0]
+    y = shifted[:, 1]
     return 0.5 * float(np.dot(x, np.roll(y, -1)) - np.dot(np.roll(x, -1), y))
 
 
 def centroid(corners: FloatArray) -> FloatArray:
     """Centre of area (2,) [m] of a simple polygon given by its (N, 2) corners [m]."""
     shifted = corners - corners[0]
-    x, y = shifted[:, 0], shifted[:, 1]
+    x = shifted[:, 0]
+    y = shifted[:, 1]
     cross = x * np.roll(y, -1) - np.roll(x, -1) * y
     sums = np.array([np.dot(x + np.roll(x, -1), cross), np.dot(y + np.roll(y, -1), cross)])
     centre: FloatArray = corners[0] + sums / (3.0 * cross.sum())
@@ -107,7 +109,8 @@ def _without_dents(name: str, ring: FloatArray, rounding: float) -> FloatArray:
     """The corners of a ring that span its hull, if the others lie on its edges up to rounding."""
     import shapely
 
-    hull, points = shapely.convex_hull(shapely.multipoints(ring)), shapely.points(ring)
+    hull = shapely.convex_hull(shapely.multipoints(ring))
+    points = shapely.points(ring)
     size = float(np.ptp(ring, axis=0).max())
     if hull.area <= 1e-9 * size * size:
         raise InvalidInputError(f"{name} must have an area, got {hull.area:g} m²")
@@ -158,7 +161,8 @@ def grown_outlines(
     vertices: FloatArray, offsets: IntArray, margins: FloatArray
 ) -> tuple[FloatArray, IntArray]:
     """`grown_outline` of each of K flattened outlines by its own margin (K,) [m]."""
-    corners, following = vertices, next_corner(offsets)
+    corners = vertices
+    following = next_corner(offsets)
     margin = np.repeat(margins, np.diff(offsets))[:, None]
     edges = corners[following] - corners
     after = edges / np.hypot(edges[:, 0], edges[:, 1])[:, None]  # (V, 2) directions
@@ -242,7 +246,8 @@ def areas_and_centroids(vertices: FloatArray, offsets: IntArray) -> tuple[FloatA
     """`signed_area` (K,) [m²] and `centroid` (K, 2) [m] of flattened outlines with an area."""
     if len(offsets) < 2:
         return np.zeros(0), np.zeros((0, 2))
-    starts, after = offsets[:-1], next_corner(offsets)
+    starts = offsets[:-1]
+    after = next_corner(offsets)
     shifted = vertices - np.repeat(vertices[starts], np.diff(offsets), axis=0)
     cross = shifted[:, 0] * shifted[after, 1] - shifted[after, 0] * shifted[:, 1]
     twice = np.add.reduceat(cross, starts)
@@ -270,7 +275,8 @@ def outline_boxes(vertices: FloatArray, offsets: IntArray) -> FloatArray:
     if len(offsets) < 2:
         return np.zeros((0, 4))
     first = offsets[:-1]
-    low, high = np.minimum.reduceat(vertices, first), np.maximum.reduceat(vertices, first)
+    low = np.minimum.reduceat(vertices, first)
+    high = np.maximum.reduceat(vertices, first)
     return np.ascontiguousarray(np.hstack([low, high]))
 
 
@@ -287,7 +293,8 @@ def transform(pose: ArrayLike, points_body: FloatArray) -> FloatArray:
         points_body: (N, 2) points in the body frame.
     """
     x, y, theta = np.asarray(pose, dtype=np.float64)
-    c, s = np.cos(theta), np.sin(theta)
+    c = np.cos(theta)
+    s = np.sin(theta)
     rotation = np.array([[c, -s], [s, c]])
     points_world: FloatArray = points_body @ rotation.T + np.array([x, y])
     return points_world
@@ -296,5 +303,7 @@ def transform(pose: ArrayLike, points_body: FloatArray) -> FloatArray:
 def transform_outlines(poses: FloatArray, vertices: FloatArray, offsets: IntArray) -> FloatArray:
     """Carry flattened outlines (V, 2) [m] from the frames of K bodies at (K, 3) to the world."""
     x, y, theta = np.repeat(poses, np.diff(offsets), axis=0).T
-    c, s, (u, v) = np.cos(theta), np.sin(theta), vertices.T
+    c = np.cos(theta)
+    s = np.sin(theta)
+    (u, v) = vertices.T
     return np.column_stack([x + c * u - s * v, y + s * u + c * v])

@@ -44,7 +44,8 @@ def goes_back(poses: FloatArray, size: float) -> BoolArray:
         poses: x, y [m] and heading [rad].
         size: of the robot [m]; what leads back by less than a thousandth of it is rounding.
     """
-    moves, headings = np.diff(poses[:, :2], axis=0), poses[:-1, 2]
+    moves = np.diff(poses[:, :2], axis=0)
+    headings = poses[:-1, 2]
     back = moves[:, 0] * np.cos(headings) + moves[:, 1] * np.sin(headings) < -1e-3 * size
     return np.append(back, back[-1:] if len(back) else [False])
 

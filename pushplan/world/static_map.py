@@ -73,7 +73,8 @@ class StaticMap(ArrayRecord, CheckedFields):
             ) from error
         if bounds is None:
             polygons = convex_outlines("static.polygons", polygons)
-            ends, reach = lines.reshape(-1, 2), np.repeat(thick, 2)[:, None]
+            ends = lines.reshape(-1, 2)
+            reach = np.repeat(thick, 2)[:, None]
             every = np.concatenate([*polygons, ends - reach, ends + reach])
             if len(every) == 0:
                 raise InvalidInputError("a static map without obstacles needs bounds")

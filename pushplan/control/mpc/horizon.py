@@ -112,8 +112,12 @@ def lay_steps(horizon: Horizon, span: float, held: float) -> None:
 @kernel
 def shift_steps(horizon: Horizon, held: float) -> None:
     """Set which step of the last solution each one lies in, ``held`` [s] later."""
-    old, new, count = horizon.solved, horizon.steps, horizon.steps.shape[0]
-    index, end, begin = 0, old[0], 0.0
+    old = horizon.solved
+    new = horizon.steps
+    count = horizon.steps.shape[0]
+    index = 0
+    end = old[0]
+    begin = 0.0
     for k in range(count):
         middle = begin + new[k] - 0.5 * new[k]
         while index < count and end - held < middle:
@@ -127,17 +131,23 @@ def shift_steps(horizon: Horizon, held: float) -> None:
 @kernel
 def set_bounds(horizon: Horizon, first: float, later: float) -> None:
     """Bound the commands, ±1, and by what they change in times [s], in the program's units."""
-    program, limits, units = horizon.program, horizon.limits, horizon.units
-    n, moves = program.x.shape[0], program.moves
+    program = horizon.program
+    limits = horizon.limits
+    units = horizon.units
+    n = program.x.shape[0]
+    moves = program.moves
     for i in range(n):
-        program.low[i], program.high[i] = -1.0, 1.0
+        program.low[i] = -1.0
+        program.high[i] = 1.0
     for b in range(program.blocks.shape[0]):
-        kind, row = horizon.columns[program.blocks[b] // moves], n + b * moves
+        kind = horizon.columns[program.blocks[b] // moves]
+        row = n + b * moves
         rate = limits.max_acceleration if kind == 0 else limits.max_turn_acceleration
         for i in range(moves):
             reach = rate / units[kind] * (first if i == 0 else later)
             before = horizon.last[kind] / units[kind] if i == 0 else 0.0
-            program.low[row + i], program.high[row + i] = before - reach, before + reach
+            program.low[row + i] = before - reach
+            program.high[row + i] = before + reach
 
 
 def solve_rounds(
@@ -167,7 +177,8 @@ def solve_rounds(
 
 def _solve_about(horizon: Horizon, solver: ProgramSolver) -> bool:
     """Solve the program from the nominal commands, and replace them; False if it is not solved."""
-    moves, columns = horizon.program.moves, horizon.columns
+    moves = horizon.program.moves
+    columns = horizon.columns
     nominal = horizon.nominal[:, columns]
     horizon.program.x[:] = (nominal / horizon.units[columns]).T.ravel()
     if not solver.solve():
@@ -196,9 +207,11 @@ def send(horizon: Horizon, v: float, w: float, held: float, ramps: bool, out: Fl
         ramps: whether the accelerations limit it too.
         out: (2,) speed and turn rate.
     """
-    limits, last = horizon.limits, horizon.last
+    limits = horizon.limits
+    last = horizon.last
     if ramps:
-        dv, dw = limits.max_acceleration * held, limits.max_turn_acceleration * held
+        dv = limits.max_acceleration * held
+        dw = limits.max_turn_acceleration * held
         v = min(max(v, last[0] - dv), last[0] + dv)
         w = min(max(w, last[1] - dw), last[1] + dw)
     if limits.constant:
@@ -208,20 +221,25 @@ def send(horizon: Horizon, v: float, w: float, held: float, ramps: bool, out: Fl
     if limits.turning_radius > 0.0:
         most = min(most, abs(out[0]) / limits.turning_radius)
     out[1] = min(max(w, -most), most)
-    last[0], last[1] = out[0], out[1]
+    last[0] = out[0]
+    last[1] = out[1]
 
 
 @kernel
 def remember(horizon: Horizon, time: float, over: float) -> None:
     """Add the last command, sent at ``time``, and drop those that another followed by ``over``."""
-    sent, count, drop = horizon.sent, horizon.counts[UNDER_WAY], 0
+    sent = horizon.sent
+    count = horizon.counts[UNDER_WAY]
+    drop = 0
     while drop < count and (count - drop >= sent.shape[0] or _followed(sent, count, drop, over)):
         drop += 1
     for i in range(drop, count):
         for j in range(3):
             sent[i - drop, j] = sent[i, j]
     count -= drop
-    sent[count, 0], sent[count, 1], sent[count, 2] = time, horizon.last[0], horizon.last[1]
+    sent[count, 0] = time
+    sent[count, 1] = horizon.last[0]
+    sent[count, 2] = horizon.last[1]
     horizon.counts[UNDER_WAY] = count + 1
 
 

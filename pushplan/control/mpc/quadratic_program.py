@@ -39,7 +39,9 @@ class QuadraticProgram(NamedTuple):
 def quadratic_program(count: int, moves: int, blocks: IntArray) -> QuadraticProgram:
     """Memory for a program over ``count`` variables."""
     rows = count + len(blocks) * moves
-    hessian, gradient, x = np.zeros((count, count)), np.zeros(count), np.zeros(count)
+    hessian = np.zeros((count, count))
+    gradient = np.zeros(count)
+    x = np.zeros(count)
     return QuadraticProgram(moves, blocks, hessian, gradient, -np.ones(rows), np.ones(rows), x)
 
 
@@ -57,7 +59,8 @@ class ProgramSolver:
     def __init__(self, program: QuadraticProgram, tolerance: float, iterations: int) -> None:
         self._program = program
         n = len(program.x)
-        rows, moves = np.eye(len(program.low), n), program.moves
+        rows = np.eye(len(program.low), n)
+        moves = program.moves
         for b, first in enumerate(program.blocks):
             change = np.eye(moves) - np.eye(moves, k=-1)
             rows[n + b * moves : n + (b + 1) * moves, first : first + moves] = change

@@ -66,7 +66,8 @@ class MpcTracker:
         """See `pushplan.world.Controller`."""
         self._clock.reset()
         self._stages.reset()
-        self._memory, self._earlier = None, 0
+        self._memory = None
+        self._earlier = 0
         self._begin()
 
     def _begin(self) -> None:
@@ -83,7 +84,8 @@ class MpcTracker:
     def _follow(self, world: World, plan: Plan) -> Twist:
         """Start afresh in a new episode, on a new plan, or where the robot is another one."""
         if self._robot is not world.robot and self._robot != world.robot:
-            self._robot, self._plan = world.robot, None
+            self._robot = world.robot
+            self._plan = None
             self._earlier = self.fallbacks
             self._memory = tracker_memory(world.robot, self.config)
             program = self._memory.horizon.program
@@ -92,12 +94,16 @@ class MpcTracker:
             )
             driven = driven_twist(world)
             self._memory.horizon.last[:] = driven.linear, driven.angular
-        memory, out = self._memory, self._out
+        memory = self._memory
+        out = self._out
         assert memory is not None
         if plan is not self._plan:
-            self._plan, self._track = plan, track_of(plan)
+            self._plan = plan
+            self._track = track_of(plan)
             begin_track(memory)
-        pose, time, held = owned(world.robot_pose), world.time, self._clock.held
+        pose = owned(world.robot_pose)
+        time = world.time
+        held = self._clock.held
         if begin_step(memory, self._track, pose, time, held, out):
             solved = solve_rounds(
                 memory.horizon,

@@ -34,7 +34,8 @@ from pushplan.world.checks import FloatArray
 
 _BACK = 0.25  # how far the place on the path may move back from one call to the next [R]
 _WINDOW = 2.0  # how far ahead of the last place the next one is looked for [R]
-_TURN_STOPPED, _TURN_DRIVING = 0.25 * np.pi, 0.5 * np.pi
+_TURN_STOPPED = 0.25 * np.pi
+_TURN_DRIVING = 0.5 * np.pi
 """Heading errors from which a robot turns towards the path first [rad]."""
 
 
@@ -67,7 +68,9 @@ def begin_step(
     out: FloatArray,  # (2,) the command
 ) -> bool:
     """Put up the program for where the robot is; False if the command is known, and filled."""
-    horizon, tuning, here = memory.horizon, memory.tuning, memory.pose
+    horizon = memory.horizon
+    tuning = memory.tuning
+    here = memory.pose
     lay_steps(horizon, memory.span, held)
     if horizon.counts[KNOWN] == 1:
         _shift(horizon, held)
@@ -173,9 +176,11 @@ def _shift(horizon: Horizon, held: float) -> None:
 @kernel
 def _predict(memory: TrackerMemory, pose: FloatArray, time: float) -> None:
     """Set where the robot will be when a command of now takes effect."""
-    here, horizon = memory.pose, memory.horizon
+    here = memory.pose
+    horizon = memory.horizon
     copy_into(here, pose)
-    out, count = memory.assembly.motion, horizon.counts[UNDER_WAY]
+    out = memory.assembly.motion
+    count = horizon.counts[UNDER_WAY]
     # the command in force t seconds from now is the one that was sent `delay` before that
     for i in range(count):
         until = horizon.sent[i + 1, 0] if i + 1 < count else time
@@ -192,7 +197,8 @@ def _fall_back(
 ) -> None:
     """Drive the last solution, moved on; pure pursuit where it has run out."""
     horizon = memory.horizon
-    counts, ahead = horizon.counts, horizon.solution[0]
+    counts = horizon.counts
+    ahead = horizon.solution[0]
     counts[FAILED] += 1
     counts[MISSED] += 1
     known = counts[KNOWN] == 1 and np.isfinite(ahead[0]) and np.isfinite(ahead[1])
@@ -207,7 +213,9 @@ def _fall_back(
 @kernel
 def pursue(memory: TrackerMemory, track: ReferencePath, pose: FloatArray) -> tuple[float, float]:
     """Speed and turn rate on the arc to a point R ahead (Coulter, CMU-RI-TR-92-01)."""
-    tuning, lengths, poses = memory.tuning, track.lengths, track.poses
+    tuning = memory.tuning
+    lengths = track.lengths
+    poses = track.poses
     last = lengths.shape[0] - 1
     aim = memory.place[0] + tuning.size
     i = 0
@@ -224,7 +232,8 @@ def pursue(memory: TrackerMemory, track: ReferencePath, pose: FloatArray) -> tup
         fraction = (aim - lengths[i]) / (lengths[i + 1] - lengths[i])
         x = poses[i, 0] + fraction * (poses[i + 1, 0] - poses[i, 0])
         y = poses[i, 1] + fraction * (poses[i + 1, 1] - poses[i, 1])
-    dx, dy = x - pose[0], y - pose[1]
+    dx = x - pose[0]
+    dy = y - pose[1]
     bearing = wrap_angle(np.arctan2(dy, dx) - pose[2])
     if abs(bearing) > _turn_from(memory):
         turn = tuning.max_turn_rate if bearing > 0.0 else -tuning.max_turn_rate

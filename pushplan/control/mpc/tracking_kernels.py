@@ -62,28 +62,39 @@ def locate(
 ) -> tuple[float, int, float]:
     """Path length [m], segment and fraction of it of the nearest point between two lengths [m]."""
     # past the last pose the path goes on straight
-    poses, lengths = track.poses, track.lengths
+    poses = track.poses
+    lengths = track.lengths
     last = poses.shape[0] - 1
-    best, along, index, fraction = np.inf, lengths[last], last, 0.0
+    best = np.inf
+    along = lengths[last]
+    index = last
+    fraction = 0.0
     i = max(0, int(np.searchsorted(lengths, low, side="right")) - 1)
     while i < last and lengths[i] <= high:
-        ax, ay = poses[i, 0], poses[i, 1]
-        ex, ey = poses[i + 1, 0] - ax, poses[i + 1, 1] - ay
+        ax = poses[i, 0]
+        ay = poses[i, 1]
+        ex = poses[i + 1, 0] - ax
+        ey = poses[i + 1, 1] - ay
         square = ex * ex + ey * ey
         t = 0.0
         if square > 1e-18:
             t = min(max(((x - ax) * ex + (y - ay) * ey) / square, 0.0), 1.0)
-        dx, dy = x - ax - t * ex, y - ay - t * ey
+        dx = x - ax - t * ex
+        dy = y - ay - t * ey
         gap = dx * dx + dy * dy
         if gap < best:
-            best, index, fraction = gap, i, t
+            best = gap
+            index = i
+            fraction = t
             along = lengths[i] + t * (lengths[i + 1] - lengths[i])
         i += 1
     if index >= last - 1 and (index == last or fraction >= 1.0):
-        cx, sy = np.cos(poses[last, 2]), np.sin(poses[last, 2])
+        cx = np.cos(poses[last, 2])
+        sy = np.sin(poses[last, 2])
         over = (x - poses[last, 0]) * cx + (y - poses[last, 1]) * sy
         along = lengths[last] + max(over, 0.0)
-        index, fraction = last, 0.0
+        index = last
+        fraction = 0.0
     return along, index, fraction
 
 
@@ -96,20 +107,27 @@ def errors(
     poses = track.poses
     last = poses.shape[0] - 1
     i = min(index, last)
-    ax, ay, heading = poses[i, 0], poses[i, 1], poses[i, 2]
-    curvature, bulge = 0.0, 0.0
-    nx, ny = -np.sin(heading), np.cos(heading)
+    ax = poses[i, 0]
+    ay = poses[i, 1]
+    heading = poses[i, 2]
+    curvature = 0.0
+    bulge = 0.0
+    nx = -np.sin(heading)
+    ny = np.cos(heading)
     if i < last:
-        ex, ey = poses[i + 1, 0] - ax, poses[i + 1, 1] - ay
+        ex = poses[i + 1, 0] - ax
+        ey = poses[i + 1, 1] - ay
         length = np.sqrt(ex * ex + ey * ey)
         turn = wrap_angle(poses[i + 1, 2] - heading)
         if length > 1e-9:
-            nx, ny = -ey / length, ex / length
+            nx = -ey / length
+            ny = ex / length
             slip = wrap_angle(np.arctan2(ey, ex) - heading - 0.5 * turn)
             if abs(slip) < 0.1 * abs(turn):  # an arc; else the corner of a polyline
                 curvature = turn / length
                 bulge = -0.5 * turn * length * fraction * (1.0 - fraction)
-            ax, ay = ax + fraction * ex, ay + fraction * ey
+            ax = ax + fraction * ex
+            ay = ay + fraction * ey
         heading += fraction * turn
     offset = (x - ax) * nx + (y - ay) * ny - bulge
     return offset, wrap_angle(theta - heading), heading, curvature
@@ -140,17 +158,24 @@ def arc(
     """Fill the pose after a constant twist, its dx, dy, d(x, y)/dw and d(x, y)/dv."""
     half = 0.5 * w * dt
     if abs(half) > 1e-4:
-        sinc, slope = np.sin(half) / half, (np.cos(half) * half - np.sin(half)) / (half * half)
+        sinc = np.sin(half) / half
+        slope = (np.cos(half) * half - np.sin(half)) / (half * half)
     else:
-        sinc, slope = 1.0 - half * half / 6.0, -half / 3.0
-    c, s = np.cos(theta + half), np.sin(theta + half)
+        sinc = 1.0 - half * half / 6.0
+        slope = -half / 3.0
+    c = np.cos(theta + half)
+    s = np.sin(theta + half)
     chord = v * dt * sinc
-    out[3], out[4] = chord * c, chord * s
-    out[0], out[1], out[2] = x + out[3], y + out[4], theta + w * dt
+    out[3] = chord * c
+    out[4] = chord * s
+    out[0] = x + out[3]
+    out[1] = y + out[4]
+    out[2] = theta + w * dt
     rate = v * dt * slope * 0.5 * dt
     out[5] = rate * c - chord * s * 0.5 * dt
     out[6] = rate * s + chord * c * 0.5 * dt
-    out[7], out[8] = dt * sinc * c, dt * sinc * s
+    out[7] = dt * sinc * c
+    out[8] = dt * sinc * s
 
 
 @kernel
@@ -167,13 +192,15 @@ def assemble(
     memory: AssemblyMemory,
 ) -> None:
     """Fill P and q of min 1/2 zᵀPz + qᵀz over z = (w_0 .. w_N-1 [, v_0 .. v_N-1]), as fractions."""
-    count, n = steps.shape[0], gradient.shape[0]
+    count = steps.shape[0]
+    n = gradient.shape[0]
     hessian[:] = 0.0
     gradient[:] = 0.0
     jacobian, rows, out, here = memory
     jacobian[:] = 0.0
     copy_into(here, pose)
-    place, speed = along, twist[0]
+    place = along
+    speed = twist[0]
     unit = tuning.size / tuning.max_speed  # T [s]
     _, index, fraction = locate(track, here[0], here[1], place, place)
     curvature = errors(track, here[0], here[1], here[2], index, fraction)[3]
@@ -190,12 +217,15 @@ def assemble(
             nominal[k, 1] = turning
         arc(here[0], here[1], here[2], speed, nominal[k, 1], dt, out)
         _differentiate(jacobian, k, count, out, dt, tuning)
-        here[0], here[1], here[2] = out[0], out[1], out[2]
+        here[0] = out[0]
+        here[1] = out[1]
+        here[2] = out[2]
         place, index, fraction = locate(track, here[0], here[1], place, place + 2.0 * speed * dt)
         offset, error, heading, curvature = errors(
             track, here[0], here[1], here[2], index, fraction
         )
-        c, s = np.cos(heading), np.sin(heading)
+        c = np.cos(heading)
+        s = np.sin(heading)
         away = 1.0 - curvature * offset
         for j in range(n):
             ahead = c * jacobian[0, j] + s * jacobian[1, j]
@@ -264,7 +294,8 @@ def _add(
     weight: float,
 ) -> None:
     """Add weight/2 (value + row (z - z_nominal))² to the cost, to the lower half of P."""
-    count, n = nominal.shape[0], row.shape[0]
+    count = nominal.shape[0]
+    n = row.shape[0]
     for j in range(n):  # later inputs have no influence, and may not be known yet
         if row[j] != 0.0:
             turns = j < count
@@ -276,7 +307,8 @@ def _add(
     for j in range(n):
         if row[j] == 0.0:
             continue
-        part, target = weight * row[j], hessian[j]
+        part = weight * row[j]
+        target = hessian[j]
         gradient[j] += part * value
         for i in range(j + 1):
             target[i] += part * row[i]

@@ -210,7 +210,8 @@ def straight_leg(
     robot: RobotModel, a: FloatArray, b: FloatArray
 ) -> tuple[float, float, float, float]:
     """From a pose (3,) to another at full speed: dx, dy [m], turn [rad], time [s]."""
-    dx, dy = float(b[0] - a[0]), float(b[1] - a[1])
+    dx = float(b[0] - a[0])
+    dy = float(b[1] - a[1])
     turn = math.remainder(float(b[2] - a[2]), 2.0 * math.pi)
     return dx, dy, turn, max(math.hypot(dx, dy) / robot.max_speed, abs(turn) / robot.max_turn_rate)
 
@@ -224,7 +225,8 @@ def warm_up_simulator(simulator: Simulator, world: World, materials: Materials) 
         materials: as `Simulator.build` takes them.
     """
     robot = world.robot
-    radius, ahead = robot.circumscribed_radius, Twist(robot.max_speed, 0.0)
+    radius = robot.circumscribed_radius
+    ahead = Twist(robot.max_speed, 0.0)
     alone = replace(world, movables=world.movables.select(np.zeros(0, dtype=np.int64)))
     worlds = [world, alone]
     if len(world.movables):
@@ -232,7 +234,8 @@ def warm_up_simulator(simulator: Simulator, world: World, materials: Materials) 
         gap = radius + float(world.movables.radii[0])
         worlds.append(world.moved(robot_pose=np.array([x - gap, y, 0.0])))
     for part in world.static.convex_parts[:1]:
-        (x, _), (_, y) = part.min(axis=0), part.mean(axis=0)
+        (x, _) = part.min(axis=0)
+        (_, y) = part.mean(axis=0)
         worlds.append(world.moved(robot_pose=np.array([x - radius, y, 0.0])))
     for scene in worlds:
         simulator.build(scene, materials)

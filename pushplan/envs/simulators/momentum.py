@@ -28,7 +28,8 @@ def slow_down(
             continue
         speed = math.hypot(velocities[i, 0], velocities[i, 1])
         fraction = _kept(speed, drag[i, 0], drag[i, 1], h)
-        out[i, 0], out[i, 1] = fraction * velocities[i, 0], fraction * velocities[i, 1]
+        out[i, 0] = fraction * velocities[i, 0]
+        out[i, 1] = fraction * velocities[i, 1]
         out[i, 2] = velocities[i, 2] * _kept(abs(velocities[i, 2]), drag[i, 2], drag[i, 3], h)
     return out
 
@@ -64,7 +65,8 @@ class Momentum:
             for k, mass in enumerate(movables.masses)
         ]
         inertia = np.ones((1 + len(movables), 2))
-        inertia[1:, 0], inertia[1:, 1] = movables.masses, moments
+        inertia[1:, 0] = movables.masses
+        inertia[1:, 1] = moments
         drag = np.zeros((len(inertia), 4))
         if materials.water is not None:
             drag = materials.water.coefficients(world) / np.repeat(inertia, 2, axis=1)

@@ -75,13 +75,17 @@ class MujocoBodies:
             limits = self.model.actuator_forcerange[:, 1]
             inertia = self.model.body("robot").inertia.max()
             self.accelerations = options.thrust, float(limits[2] / inertia)
-        model, data = self.model, self.data
+        model = self.model
+        data = self.data
         self.qpos: FloatArray = data.qpos  # all positions and velocities, the engine's own arrays
         self.qvel: FloatArray = data.qvel
-        self.ctrl, self._damping = data.ctrl, model.dof_damping
-        self._asleep, self._touch = data.tree_asleep, data.sensordata
+        self.ctrl = data.ctrl
+        self._damping = model.dof_damping
+        self._asleep = data.tree_asleep
+        self._touch = data.sensordata
         first = 3 if self.afloat else 9
-        self._first_q, self._first_v = first, 3 if self.afloat else 8
+        self._first_q = first
+        self._first_v = 3 if self.afloat else 8
         size_q, size_v = (3, 3) if self.afloat else (7, 6)
         self._objects_q = self.qpos[first:].reshape(-1, size_q)
         self._objects_v = self.qvel[self._first_v :].reshape(-1, size_v)
@@ -95,20 +99,29 @@ class MujocoBodies:
         Objects at rest are asleep until something touches them.
         """
         assert world.robot_twist is not None
-        model, water = self.model, self._water
+        model = self.model
+        water = self._water
         self._drag = None if water is None else water.coefficients(world)
-        qpos, qvel = np.array(model.qpos0), np.zeros(model.nv)
-        poses, twists = world.movables.poses, world.movables.twists
+        qpos = np.array(model.qpos0)
+        qvel = np.zeros(model.nv)
+        poses = world.movables.poses
+        twists = world.movables.twists
         if self.afloat:
-            qpos[:3], qvel[:3] = world.robot_pose, world.robot_twist
-            qpos[3:], qvel[3:] = poses.ravel(), twists.ravel()
+            qpos[:3] = world.robot_pose
+            qvel[:3] = world.robot_twist
+            qpos[3:] = poses.ravel()
+            qvel[3:] = twists.ravel()
         else:
             self._put_robot(qpos, qvel, world.robot_pose, world.robot_twist)
-            rows, rates = qpos[9:].reshape(-1, 7), qvel[8:].reshape(-1, 6)
-            rows[:, :2], rows[:, 2] = poses[:, :2], self._rest_height
-            rows[:, 3], rows[:, 6] = np.cos(0.5 * poses[:, 2]), np.sin(0.5 * poses[:, 2])
+            rows = qpos[9:].reshape(-1, 7)
+            rates = qvel[8:].reshape(-1, 6)
+            rows[:, :2] = poses[:, :2]
+            rows[:, 2] = self._rest_height
+            rows[:, 3] = np.cos(0.5 * poses[:, 2])
+            rows[:, 6] = np.sin(0.5 * poses[:, 2])
             rows[:, 4:6] = 0.0
-            rates[:, :2], rates[:, 5] = twists[:, :2], twists[:, 2]
+            rates[:, :2] = twists[:, :2]
+            rates[:, 5] = twists[:, 2]
         quiet: BoolArray = np.logical_not(twists.any(axis=1))
         asleep = rest_cycles(poses, *self._outlines, quiet, self._gap)
         self._load(world.time, qpos, qvel, asleep)
@@ -120,7 +133,8 @@ class MujocoBodies:
         x, y, theta = (float(value) for value in pose)
         qpos[:3] = x, y, self._wheel_radius
         qpos[3:7] = math.cos(0.5 * theta), 0.0, 0.0, math.sin(0.5 * theta)
-        qvel[:2], qvel[5] = twist[:2], twist[2]
+        qvel[:2] = twist[:2]
+        qvel[5] = twist[2]
         speed = float(twist[0]) * math.cos(theta) + float(twist[1]) * math.sin(theta)
         qvel[6:8] = self.wheel_speeds(speed, float(twist[2]))
 
@@ -147,7 +161,8 @@ class MujocoBodies:
         if self.afloat:
             return np.array(self.qvel).reshape(-1, 3)
         rows = np.empty((1 + self.count, 6))
-        rows[0], rows[1:] = self.qvel[:6], self.qvel[8:].reshape(-1, 6)
+        rows[0] = self.qvel[:6]
+        rows[1:] = self.qvel[8:].reshape(-1, 6)
         return np.ascontiguousarray(rows[:, [0, 1, 5]])
 
     # ---------------------------------------------------------------- state
@@ -159,7 +174,8 @@ class MujocoBodies:
     def hidden_without(self, gone: IntArray) -> FloatArray:
         """What `hidden` would return without some of the objects, given by index."""
         kept = np.delete(np.arange(self.count), gone)
-        positions, velocities = self._objects_q[kept], self._objects_v[kept]
+        positions = self._objects_q[kept]
+        velocities = self._objects_v[kept]
         asleep = np.full(len(kept), AWAKE)  # who rests is found out anew
         return np.concatenate(
             [
@@ -219,7 +235,8 @@ class MujocoBodies:
         put_to_sleep(self.model, self.data, asleep)
 
     def _load(self, time: float, qpos: FloatArray, qvel: FloatArray, asleep: Any) -> None:
-        model, data = self.model, self.data
+        model = self.model
+        data = self.data
         mujoco.mj_resetData(model, data)
         data.time = time
         self.qpos[:] = qpos
@@ -234,7 +251,8 @@ class MujocoBodies:
 
     def advance(self, interval: float) -> None:
         """Let the engine run for ``interval`` [s], in steps that are short enough."""
-        model, data = self.model, self.data
+        model = self.model
+        data = self.data
         options = self._options
         longest = options.water_time_step if self.afloat else options.time_step
         steps = max(1, math.ceil(interval / longest - 1e-9))
@@ -243,7 +261,8 @@ class MujocoBodies:
             mujoco.mj_step(model, data, steps)
             return
         most = max(1, int(options.drag_interval / model.opt.timestep))
-        velocities, damping = self.qvel.reshape(-1, 3), self._damping.reshape(-1, 3)
+        velocities = self.qvel.reshape(-1, 3)
+        damping = self._damping.reshape(-1, 3)
         while steps > 0:
             damping[:] = drag_damping(velocities, self._drag)
             mujoco.mj_step(model, data, min(most, steps))
@@ -285,7 +304,8 @@ def drag_damping(velocities: FloatArray, drag: FloatArray) -> FloatArray:
 def planar_rows(bodies: FloatArray) -> FloatArray:
     """(..., 3) planar poses of free bodies (..., 7): x, y, z [m] and a quaternion w, x, y, z."""
     w, x, y, z = np.moveaxis(bodies[..., 3:], -1, 0)
-    sines, cosines = 2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)
+    sines = 2.0 * (w * z + x * y)
+    cosines = 1.0 - 2.0 * (y * y + z * z)
     rows = np.empty((*bodies.shape[:-1], 3))
     rows[..., :2] = bodies[..., :2]
     # not by NumPy, whose last digit depends on the processor

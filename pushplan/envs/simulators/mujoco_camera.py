@@ -39,7 +39,8 @@ class MujocoCamera:
         height = integer("photograph height", height, low=16, high=4096)
         self.size = width, height
         self._model = model
-        model.vis.global_.offwidth, model.vis.global_.offheight = width, height
+        model.vis.global_.offwidth = width
+        model.vis.global_.offheight = height
         model.vis.global_.fovy = _FIELD_OF_VIEW
         self._context, self._renderer = _open(model, width, height)
         self._scene = mujoco.MjvScene(model, maxgeom=_MOST_GEOMS)
@@ -53,7 +54,8 @@ class MujocoCamera:
 
     def take(self, qpos: FloatArray, world: World) -> NDArray[np.uint8]:
         """(H, W, 3) picture of the bodies, and of the goal."""
-        model, data = self._model, self._data
+        model = self._model
+        data = self._data
         data.qpos[:] = qpos
         self._aim(world)
         mujoco.mj_kinematics(model, data)
@@ -81,7 +83,8 @@ class MujocoCamera:
 
         Of bounds that are much longer than wide, only a stretch that begins at the robot is shown.
         """
-        low, high = world.static.bounds[:2].copy(), world.static.bounds[2:].copy()
+        low = world.static.bounds[:2].copy()
+        high = world.static.bounds[2:].copy()
         width, depth = (float(side) for side in high - low)
         if depth > _LONGEST * width:
             depth = _LONGEST * width
@@ -97,10 +100,12 @@ class MujocoCamera:
         along = 0.5 * depth * math.sin(tilt) / half_view
         self._camera.lookat[:] = [*(0.5 * (low + high)), 0.0]
         self._camera.distance = 1.06 * (max(across, along) + nearer)
-        self._camera.azimuth, self._camera.elevation = 90.0, _ELEVATION
+        self._camera.azimuth = 90.0
+        self._camera.elevation = _ELEVATION
 
     def _draw_goal(self, world: World) -> None:
-        goal, bounds = world.goal, world.static.bounds
+        goal = world.goal
+        bounds = world.static.bounds
         thin = 1e-3 * float((bounds[2:] - bounds[:2]).max())
         if isinstance(goal, GoalDisc):
             self._mark_disc(goal.center, goal.radius, thin)
@@ -120,7 +125,8 @@ class MujocoCamera:
             self._mark_edge(a, b, thin)
 
     def _mark_disc(self, center: FloatArray, radius: float, thin: float) -> None:
-        kind, color = mujoco.mjtGeom.mjGEOM_CYLINDER, FLOOR_PALETTE.goal[0]
+        kind = mujoco.mjtGeom.mjGEOM_CYLINDER
+        color = FLOOR_PALETTE.goal[0]
         self._mark(kind, [radius, thin, 0.0], [*center, 0.0], np.eye(3), color)
 
     def _mark_edge(self, a: FloatArray, b: FloatArray, thin: float) -> None:

@@ -58,7 +58,8 @@ def _drive_leg(
     middle = float(a[2]) + 0.5 * turn
     speed = (dx * math.cos(middle) + dy * math.sin(middle)) / duration
     rate = turn / duration
-    done, waited = 0.0, 0.0
+    done = 0.0
+    waited = 0.0
     while done < duration:
         fraction = done / duration
         reference = (
@@ -67,10 +68,13 @@ def _drive_leg(
             float(a[2]) + fraction * turn,
         )
         x, y, theta = (float(value) for value in simulator.robot_pose)
-        ex, ey = reference[0] - x, reference[1] - y
-        c, s = math.cos(theta), math.sin(theta)
+        ex = reference[0] - x
+        ey = reference[1] - y
+        c = math.cos(theta)
+        s = math.sin(theta)
         # where the reference is in the robot's frame
-        ahead, left = c * ex + s * ey, c * ey - s * ex
+        ahead = c * ex + s * ey
+        left = c * ey - s * ex
         turned = math.remainder(reference[2] - theta, 2.0 * math.pi)
         late = math.hypot(ahead, left) > _LATE * robot.circumscribed_radius
         late |= abs(turned) > _LATE
@@ -95,6 +99,7 @@ def _command(
     pace = robot.max_speed / radius
     v = speed * math.cos(turned) + 2.0 * pace * ahead
     w = rate + 4.0 * speed / radius**2 * left + 4.0 * pace * math.sin(turned)
-    top, turn = 1.2 * robot.max_speed, 1.2 * robot.max_turn_rate
+    top = 1.2 * robot.max_speed
+    turn = 1.2 * robot.max_turn_rate
     low = min(1.2 * robot.min_speed, 0.0)
     return Twist(min(max(v, low), top), min(max(w, -turn), turn))

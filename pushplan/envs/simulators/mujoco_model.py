@@ -133,13 +133,17 @@ def caster_position(robot: RobotModel) -> float:
     At the rear, unless most of the chassis is ahead of the axle.
     """
     x = robot.contact_parts[0][:, 0]
-    rear, front = float(-x.min()), float(x.max())
+    rear = float(-x.min())
+    front = float(x.max())
     return -0.85 * rear if rear >= 0.5 * front else 0.85 * front
 
 
 def _wheels(robot: RobotModel, solids: Solids, options: MujocoOptions) -> str:
-    radius, mass = solids.wheel_radius, robot.mass
-    wheel_mass, width, ball = _WHEEL_MASS * mass, 0.4 * radius, _CASTER * radius
+    radius = solids.wheel_radius
+    mass = robot.mass
+    wheel_mass = _WHEEL_MASS * mass
+    width = 0.4 * radius
+    ball = _CASTER * radius
     # of the motor, as its wheel feels it through the gear [kg m²]
     rotor = options.rotor_inertia * mass * radius**2
     return _filled(
@@ -174,10 +178,14 @@ def _add_robot(
     spec: Any, robot: RobotModel, solids: Solids, palette: Palette, afloat: bool
 ) -> None:
     """The footprint's parts, chassis or hull first, then the bumper; and what one sees."""
-    body, hull, height = spec.body("robot"), robot.contact_parts[0], solids.robot_height
+    body = spec.body("robot")
+    hull = robot.contact_parts[0]
+    height = solids.robot_height
     if afloat:
-        ground, low = 0.0, -0.5 * solids.object_height
-        mass, middle = robot.mass, [*centroid(hull), 0.0]
+        ground = 0.0
+        low = -0.5 * solids.object_height
+        mass = robot.mass
+        middle = [*centroid(hull), 0.0]
     else:
         ground = solids.wheel_radius  # height of the body's frame
         low = _CLEARANCE * ground
@@ -201,20 +209,25 @@ def _add_static(spec: Any, static: StaticMap, solids: Solids, color: str, afloat
     """Walls and columns; rounded ends of thick segments are upright cylinders."""
     top = solids.wall_height
     bottom = -top if afloat else 0.0
-    middle, half = 0.5 * (bottom + top), 0.5 * (top - bottom)
+    middle = 0.5 * (bottom + top)
+    half = 0.5 * (top - bottom)
     body = spec.body("static")
     for i, polygon in enumerate(static.polygons):
         add_prism(spec, body, f"static {i}", polygon, bottom, top, "static", color)
     thin = 1e-3 * float((static.bounds[2:] - static.bounds[:2]).max())
     for i, (line, radius) in enumerate(zip(static.segments, static.radii, strict=True)):
-        a, b = line[:2], line[2:]
+        a = line[:2]
+        b = line[2:]
         r = float(radius) or thin
-        length, heading = float(np.hypot(*(b - a))), float(np.arctan2(*(b - a)[::-1]))
+        length = float(np.hypot(*(b - a)))
+        heading = float(np.arctan2(*(b - a)[::-1]))
         if length:
-            size, pos = [0.5 * length, r, half], [*(0.5 * (a + b)), middle]
+            size = [0.5 * length, r, half]
+            pos = [*(0.5 * (a + b)), middle]
             add_geom(spec, body, f"segment {i}", "box", size, pos, "static", color, yaw=heading)
         for end, point in enumerate((a, b) if radius else ()):
-            size, pos = [r, half, 0.0], [*point, middle]
+            size = [r, half, 0.0]
+            pos = [*point, middle]
             add_geom(spec, body, f"segment {i} end {end}", "cylinder", size, pos, "static", color)
 
 
@@ -230,12 +243,15 @@ def _add_object(
     spec: Any, k: int, movables: Movables, solids: Solids, palette: Palette, afloat: bool
 ) -> None:
     """A floe, or a box: a free body whose frame is in the middle of its height."""
-    outline, mass = movables.outline(k), float(movables.masses[k])
-    half, name = 0.5 * solids.object_height, f"object {k}"
+    outline = movables.outline(k)
+    mass = float(movables.masses[k])
+    half = 0.5 * solids.object_height
+    name = f"object {k}"
     wheeled = bool(movables.wheeled[k]) and not afloat
     body = spec.worldbody.add_body(name=name, pos=[0.0, 0.0, 0.0 if afloat else half])
     if afloat:
-        slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
+        slide = mujoco.mjtJoint.mjJNT_SLIDE
+        hinge = mujoco.mjtJoint.mjJNT_HINGE
         for kind, axis in zip((slide, slide, hinge), np.eye(3), strict=True):
             body.add_joint(type=kind, axis=axis)
     else:
@@ -246,7 +262,8 @@ def _add_object(
         radius = ball_radius(outline, solids)
         low += 1.2 * radius
         for i, corner in enumerate(_caster_corners(outline)):
-            ball, pos = f"{name} caster {i}", [*(0.75 * corner), radius - half]
+            ball = f"{name} caster {i}"
+            pos = [*(0.75 * corner), radius - half]
             add_geom(spec, body, ball, "sphere", [radius, 0.0, 0.0], pos, "caster")
     color = (palette.wheeled if wheeled else palette.box)[0]
     add_prism(spec, body, name, outline, low, half, "object", color)

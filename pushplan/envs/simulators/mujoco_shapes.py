@@ -92,13 +92,15 @@ def add_prism(
     box = as_rectangle(outline)
     if box is not None:
         center, half, heading = box
-        size, pos = [*half, 0.5 * (high - low)], [*center, 0.5 * (low + high)]
+        size = [*half, 0.5 * (high - low)]
+        pos = [*center, 0.5 * (low + high)]
         add_geom(spec, body, name, "box", size, pos, kind, color, heading)
         return
     count = len(outline)
     corners = np.empty((2, count, 3))
     corners[..., :2] = outline
-    corners[0, :, 2], corners[1, :, 2] = low, high
+    corners[0, :, 2] = low
+    corners[1, :, 2] = high
     mesh = spec.add_mesh(name=name, uservert=corners.ravel(), userface=_prism_faces(count))
     mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
     add_geom(spec, body, name, "mesh", [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], kind, color)
@@ -151,7 +153,8 @@ def set_mass(
     body: Any, outline: FloatArray, height: float, mass: float, center: Sequence[float]
 ) -> None:
     """Give a body the mass and the inertia of a prism, about a centre of mass (3,) [m]."""
-    body.mass, body.ipos = mass, center
+    body.mass = mass
+    body.ipos = center
     body.fullinertia = prism_inertia(outline, height, mass)[1]
     body.explicitinertial = True
 

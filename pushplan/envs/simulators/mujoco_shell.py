@@ -19,8 +19,12 @@ CONTACT_GROUP = 3
 """Group of the geoms that touch, where others show the robot; the camera leaves it out."""
 _WELL = 1.15  # length of a wheel's recess over the wheel's diameter
 _TYRE_WIDTH = 0.5  # in units of the wheel radius
-_WAIST, _ROOF = 0.66, 0.76  # body above the wheels and deck on it, in units of the footprint
-_LOW, _HIGH = 0.35, 2.1  # of the base above ground, in units of the wheel radius
+# body above the wheels and deck on it, in units of the footprint
+_WAIST = 0.66
+_ROOF = 0.76
+# of the base above ground, in units of the wheel radius
+_LOW = 0.35
+_HIGH = 2.1
 _HOUSES = (
     (0.55, 0.76, 0.62, 0.0, 1.5, "white"),
     (0.60, 0.72, 0.56, 1.5, 2.3, "white"),
@@ -39,8 +43,11 @@ def add_shell(spec: Any, robot: RobotModel, solids: Solids) -> None:
         robot: footprint.
         solids: heights.
     """
-    hull, radius, top = robot.contact_parts[0], solids.wheel_radius, solids.robot_height
-    body, blue = spec.body("robot"), FLOOR_PALETTE.robot
+    hull = robot.contact_parts[0]
+    radius = solids.wheel_radius
+    top = solids.robot_height
+    body = spec.body("robot")
+    blue = FLOOR_PALETTE.robot
     # the tyres are shown at the edge of the footprint
     edge = float(np.abs(hull[:, 1]).max()) - 0.5 * _TYRE_WIDTH * radius
     high = min(_HIGH * radius, 0.6 * top)
@@ -62,7 +69,8 @@ def add_shell(spec: Any, robot: RobotModel, solids: Solids) -> None:
     for n, (outline, low, upper, kind) in enumerate(pieces):
         color = blue if kind == "shell" else None
         add_prism(spec, body, f"shell {n}", outline, low - radius, upper - radius, kind, color)
-    lidar, place = [0.3 * size, 0.12 * size, 0.0], [-0.55 * size, 0.0, top + 0.12 * size - radius]
+    lidar = [0.3 * size, 0.12 * size, 0.0]
+    place = [-0.55 * size, 0.0, top + 0.12 * size - radius]
     add_geom(spec, body, "lidar", "cylinder", lidar, place, "tyre")
     half_width = 0.5 * _TYRE_WIDTH * radius
     for name, side in (("left wheel", 1.0), ("right wheel", -1.0)):
@@ -85,15 +93,20 @@ def add_superstructure(spec: Any, robot: RobotModel, solids: Solids) -> None:
         robot: footprint, the hull first.
         solids: heights.
     """
-    hull, top, body = robot.contact_parts[0], solids.robot_height, spec.body("robot")
-    stern, bow = float(hull[:, 0].min()), float(hull[:, 0].max())
-    length, half = bow - stern, float(np.abs(hull[:, 1]).max())
+    hull = robot.contact_parts[0]
+    top = solids.robot_height
+    body = spec.body("robot")
+    stern = float(hull[:, 0].min())
+    bow = float(hull[:, 0].max())
+    length = bow - stern
+    half = float(np.abs(hull[:, 1]).max())
     middle = centroid(hull)
     deck = middle + (0.93, 0.82) * (hull - middle)
     step = 0.3 * half  # height of a storey
     add_prism(spec, body, "shell deck", deck, top, top + 0.05 * step, "deck")
     for n, (rear, front, wide, low, high, kind) in enumerate(_HOUSES):
-        (x0, x1), y = (stern + rear * length, stern + front * length), wide * half
+        (x0, x1) = (stern + rear * length, stern + front * length)
+        y = wide * half
         outline = np.array([(x0, -y), (x1, -y), (x1, y), (x0, y)])
         heights = (top + low * step, top + high * step)
         add_prism(spec, body, f"shell house {n}", outline, *heights, kind)
@@ -101,7 +114,8 @@ def add_superstructure(spec: Any, robot: RobotModel, solids: Solids) -> None:
 
 def _beside_wheels(hull: FloatArray, inside: float, radius: float) -> list[FloatArray]:
     """The convex parts of a footprint in front of the wheels, behind and between them."""
-    well, far = _WELL * radius, 10.0 * float(np.abs(hull).max())
+    well = _WELL * radius
+    far = 10.0 * float(np.abs(hull).max())
     shape = MultiPoint(hull).convex_hull
     rooms = [
         box(well, -far, far, far),

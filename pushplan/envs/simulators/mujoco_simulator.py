@@ -57,7 +57,8 @@ class MujocoSimulator(Simulator):
         if self._bodies is None or self._bodies.key != key:
             self._camera = None
             self._bodies = MujocoBodies(world, materials, self.options)
-        self._world, self._materials = world, materials
+        self._world = world
+        self._materials = materials
         self._held = self._touched = False
         self._bodies.place(world)
 
@@ -70,8 +71,10 @@ class MujocoSimulator(Simulator):
     def step(self, command: Twist, duration: float) -> Trace:
         """Drive at a body-frame velocity for ``duration`` [s]."""
         duration = number("duration", duration, low=0.0, open_low=True)
-        bodies, samples = self._scene, self.options.samples
-        start, interval = bodies.data.time, duration / samples
+        bodies = self._scene
+        samples = self.options.samples
+        start = bodies.data.time
+        interval = duration / samples
         state = bodies.refresh()
         try:
             stored, touched = self._run(command, interval)
@@ -120,7 +123,8 @@ class MujocoSimulator(Simulator):
             command: what was asked.
             interval: [s].
         """
-        robot, gains = self._world.robot, self._scene.accelerations
+        robot = self._world.robot
+        gains = self._scene.accelerations
         middle = len(poses) // 2
         halves = (poses[: middle + 1], poses[middle:])
         asked = command.linear, command.angular
@@ -174,11 +178,13 @@ class MujocoSimulator(Simulator):
     def remove(self, object_ids: Sequence[int]) -> None:
         """Take objects off the floor."""
         world, gone = self._without(object_ids)
-        touched, held = self._touched, self._held
+        touched = self._touched
+        held = self._held
         hidden = self._scene.hidden_without(gone)
         self.build(world, self._materials)
         self._scene.load_hidden(world.time, hidden)
-        self._touched, self._held = touched, held
+        self._touched = touched
+        self._held = held
 
     def photograph(self, width: int, height: int) -> NDArray[np.uint8]:
         """(H, W, 3) picture of the whole scene, seen from the south and above.
@@ -193,7 +199,8 @@ class MujocoSimulator(Simulator):
 
 def _rates(poses: FloatArray) -> tuple[float, float]:
     """Mean way along the heading [m] and turn [rad] from one of (N, 3) poses to the next."""
-    first, last = poses[0], poses[-1]
+    first = poses[0]
+    last = poses[-1]
     count = max(len(poses) - 1, 1)
     turn = math.remainder(float(last[2] - first[2]), 2.0 * math.pi)
     middle = float(first[2]) + 0.5 * turn

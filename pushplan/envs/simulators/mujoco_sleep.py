@@ -41,7 +41,8 @@ def quiet_objects(
     """
     linear = 3 if velocities.shape[1] == 6 else 2
     sizes = radii[:, None]
-    change, rates = np.abs(positions - before), np.abs(velocities)
+    change = np.abs(positions - before)
+    rates = np.abs(velocities)
     rates[:, linear:] *= sizes
     turned = change[:, linear:] * sizes
     upright: BoolArray = np.ones(len(radii), dtype=bool)
@@ -125,7 +126,8 @@ def put_to_sleep(model: Any, data: Any, asleep: IntArray) -> None:
     state = mujoco.mjtSleepState
     bodies = np.where(awake[model.body_treeid], state.mjS_AWAKE, state.mjS_ASLEEP)
     bodies[model.body_treeid < 0] = state.mjS_STATIC
-    data.tree_awake[:], data.body_awake[:] = awake, bodies
+    data.tree_awake[:] = awake
+    data.body_awake[:] = bodies
     moving = bodies != state.mjS_ASLEEP
     data.ntree_awake = int(awake.sum())
     data.nbody_awake = _listed(data.body_awake_ind, moving)

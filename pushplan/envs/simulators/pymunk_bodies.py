@@ -16,7 +16,10 @@ from pushplan.envs.simulators.momentum import Momentum
 from pushplan.world import World
 from pushplan.world.checks import FloatArray, IntArray
 
-ROBOT, OBJECT, STATIC, FIXED = 1, 2, 3, 4
+ROBOT = 1
+OBJECT = 2
+STATIC = 3
+FIXED = 4
 _GROUND = 1 << 31  # category of what is static, which wheels do not meet
 CORRECTION = 0.2
 """Fraction of an overlap beyond the slop that is taken back in one substep."""
@@ -42,7 +45,8 @@ def _step_of(space: pymunk.Space) -> Callable[[float], None]:
     engine elsewhere is stepped as usual.
     """
     engine = getattr(getattr(pymunk, "_chipmunk", None), "lib", None)
-    raw, handle = getattr(engine, "cpSpaceStep", None), getattr(space, "_space", None)
+    raw = getattr(engine, "cpSpaceStep", None)
+    handle = getattr(space, "_space", None)
     return space.step if raw is None or handle is None else partial(raw, handle)
 
 
@@ -124,14 +128,16 @@ class PymunkBodies:
         self.contacts.clear()
 
     def _add_static(self, world: World, friction: float) -> None:
-        ground, static = self.space.static_body, world.static
+        ground = self.space.static_body
+        static = world.static
         shapes: list[pymunk.Shape] = [
             pymunk.Poly(ground, polygon.tolist()) for polygon in static.polygons
         ]
         for line, radius in zip(static.segments.tolist(), static.radii.tolist(), strict=True):
             shapes.append(pymunk.Segment(ground, tuple(line[:2]), tuple(line[2:]), radius))
         for shape in shapes:
-            shape.friction, shape.collision_type = friction, STATIC
+            shape.friction = friction
+            shape.collision_type = STATIC
             shape.filter = pymunk.ShapeFilter(categories=_GROUND)
         self.space.add(*shapes)
 
@@ -140,7 +146,8 @@ class PymunkBodies:
         robot = world.robot
         for part in robot.parts:
             shape = pymunk.Poly(self.robot, part.tolist(), radius=robot.contact_radius)
-            shape.friction, shape.collision_type = friction, ROBOT
+            shape.friction = friction
+            shape.collision_type = ROBOT
             shapes.append(shape)
         for wheel in shapes[len(shapes) - robot.wheel_parts :]:
             wheel.filter = pymunk.ShapeFilter(mask=pymunk.ShapeFilter.ALL_MASKS() ^ _GROUND)
@@ -152,7 +159,8 @@ class PymunkBodies:
         movables = world.movables
         made: list[tuple[pymunk.Body, pymunk.Shape]] = []
         for k in range(len(movables)):
-            outline, radius = movables.drawn_outline(k).tolist(), float(movables.contact_radii[k])
+            outline = movables.drawn_outline(k).tolist()
+            radius = float(movables.contact_radii[k])
             mass = float(movables.masses[k])
             if movables.fixed[k]:
                 body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
@@ -270,7 +278,8 @@ class PymunkBodies:
         Returns:
             How many there were, and the heading after them.
         """
-        contacts, half = self.contacts, 0.5 * w * h
+        contacts = self.contacts
+        half = 0.5 * w * h
         for i in range(1, count + 1):
             middle = heading + half if held is None else held
             self.drive(chord * math.cos(middle), chord * math.sin(middle), w)

@@ -128,7 +128,8 @@ class PymunkDriver:
         Returns:
             (samples, 1 + A, 6) rows.
         """
-        bodies, w = self._bodies, command.angular
+        bodies = self._bodies
+        w = command.angular
         held = course if self._holds_direction else None
         samples, each = counts
         h = duration / (samples * each)
@@ -154,7 +155,8 @@ class PymunkDriver:
                         )
                     continue
                 middle = heading + half if held is None else held
-                vx, vy = advancing * math.cos(middle), advancing * math.sin(middle)
+                vx = advancing * math.cos(middle)
+                vy = advancing * math.sin(middle)
                 outcome = self._substep(vx, vy, w, h, first=first)
                 if outcome is _Moved.NOTHING:  # nor will it in the rest of the step
                     rows[i:] = bodies.read()
@@ -243,6 +245,7 @@ class PymunkDriver:
         measured = bodies.static_contacts > 0
         depth = bodies.depth if measured else 0.0
         if depth <= allowed:
-            self._deepest, self._measured = depth, measured
+            self._deepest = depth
+            self._measured = measured
             return True
         return False

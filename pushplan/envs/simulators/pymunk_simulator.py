@@ -102,7 +102,8 @@ class PymunkSimulator(Simulator):
         self._held = self._touched = False
         clear = self.clear_for(command, duration)
         if clear >= duration:
-            turn, way = abs(command.angular) * duration, abs(command.linear) * duration
+            turn = abs(command.angular) * duration
+            way = abs(command.linear) * duration
             samples = max(1, math.ceil(turn / _GLIDE_TURN), math.ceil(way / radius))
             poses = self._glide(command, duration, max(samples, _GLIDE_SAMPLES if turn else 1))
             return self._traced(duration, poses, self._resting(len(poses)))
@@ -122,7 +123,8 @@ class PymunkSimulator(Simulator):
                 command, rest, start, active, (left, each), course
             ),
         )
-        self._held, self._touched = self._driver.held, self._driver.touched
+        self._held = self._driver.held
+        self._touched = self._driver.touched
         paths = np.concatenate([resting, paths])
         return self._traced(duration, np.concatenate([robot, driven]), paths)
 
@@ -150,7 +152,8 @@ class PymunkSimulator(Simulator):
                 break
             loaded |= missed
         self._rows[1:, 3:] = 0.0
-        self._rows[0], self._rows[1 + active] = found[-1, 0], found[-1, 1:]
+        self._rows[0] = found[-1, 0]
+        self._rows[1 + active] = found[-1, 1:]
         return found[:, 0, :3], paths
 
     def clear_for(self, command: Twist, limit: float) -> float:
@@ -189,7 +192,9 @@ class PymunkSimulator(Simulator):
     def _glide(self, command: Twist, duration: float, samples: int) -> FloatArray:
         """(samples, 3) poses of a robot that touches nothing; it ends at the last one."""
         poses = np.empty((samples, 3))
-        start, v, w = self._rows[0, :3].copy(), command.linear, command.angular
+        start = self._rows[0, :3].copy()
+        v = command.linear
+        w = command.angular
         for i in range(samples):
             time = duration * (i + 1) / samples
             arc_pose(start, start[2], v, w, self.options.holds_direction, time, poses[i])

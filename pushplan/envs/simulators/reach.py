@@ -37,7 +37,8 @@ def within_reach(
     """(K,) objects in reach of the robot, those in motion, and those in reach of either."""
     parts, part_offsets, vertices, offsets, radii = shapes
     count = rows.shape[0]
-    near, found = np.zeros(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
+    near = np.zeros(count, dtype=np.bool_)
+    found = np.zeros(count, dtype=np.bool_)
     corners = np.empty_like(parts)
     transform_points(robot, parts, corners)
     size = 0.0
@@ -45,7 +46,8 @@ def within_reach(
         size = max(size, math.hypot(parts[i, 0], parts[i, 1]))
     placed = np.empty_like(vertices)
     for k in range(count):
-        a, b = offsets[k], offsets[k + 1]
+        a = offsets[k]
+        b = offsets[k + 1]
         near[k] = speeds[k] > 0.0
         gap = math.hypot(rows[k, 0] - robot[0], rows[k, 1] - robot[1]) - size - radii[k]
         if near[k] or gap > reach + speeds[k]:
@@ -92,17 +94,20 @@ def clear_time(
         size = max(size, math.hypot(parts[i, 0], parts[i, 1]))
     speed = abs(linear) + abs(angular) * size
     reach = speed * limit + margin
-    outlines, near = np.empty_like(vertices), np.empty(rows.shape[0], np.int64)
+    outlines = np.empty_like(vertices)
+    near = np.empty(rows.shape[0], np.int64)
     count = 0
     for k in range(rows.shape[0]):
         gap = math.hypot(rows[k, 0] - robot[0], rows[k, 1] - robot[1]) - size - radii[k]
         if gap <= reach:
-            a, b = offsets[k], offsets[k + 1]
+            a = offsets[k]
+            b = offsets[k + 1]
             transform_points(rows[k], vertices[a:b], outlines[a:b])
             near[count] = k
             count += 1
     corners, starts, grown, _ = obstacles
-    close, walls = np.empty(grown.shape[0], np.int64), 0
+    close = np.empty(grown.shape[0], np.int64)
+    walls = 0
     for k in range(grown.shape[0]):
         gap = core_distance(robot[0], robot[1], corners, starts[k], starts[k + 1])
         if gap - grown[k] - size <= reach:
@@ -110,7 +115,9 @@ def clear_time(
             walls += 1
     if count + walls == 0:
         return limit
-    placed, here, time = np.empty_like(parts), np.empty(3), 0.0
+    placed = np.empty_like(parts)
+    here = np.empty(3)
+    time = 0.0
     for _ in range(_ADVANCES):
         arc_pose(robot, course, linear, angular, holds, time, here)
         transform_points(here, parts, placed)
@@ -118,11 +125,13 @@ def clear_time(
         for index in range(count + walls):
             if index < count:
                 k = near[index]
-                shape, round_by = outlines[offsets[k] : offsets[k + 1]], 0.0
+                shape = outlines[offsets[k] : offsets[k + 1]]
+                round_by = 0.0
                 gap = math.hypot(rows[k, 0] - here[0], rows[k, 1] - here[1]) - radii[k]
             else:
                 k = close[index - count]
-                shape, round_by = corners[starts[k] : starts[k + 1]], grown[k]
+                shape = corners[starts[k] : starts[k + 1]]
+                round_by = grown[k]
                 gap = core_distance(here[0], here[1], corners, starts[k], starts[k + 1]) - round_by
             if gap - size >= least:
                 continue
@@ -151,7 +160,8 @@ def arc_pose(
 ) -> None:
     """Fill (3,) ``out`` with the pose after some time [s]; arguments as in `clear_time`."""
     half = 0.5 * angular * time
-    chord, middle = linear * time, course
+    chord = linear * time
+    middle = course
     if not holds:
         middle += half
         if half != 0.0:
@@ -170,9 +180,11 @@ def struck(
 ) -> BoolArray:
     """Objects that were left out although something that moved came to overlap them."""
     _, _, vertices, offsets, radii = shapes
-    steps, count = paths.shape[0], rows.shape[0]
+    steps = paths.shape[0]
+    count = rows.shape[0]
     found = np.zeros(count, dtype=np.bool_)
-    here, there = np.empty_like(vertices), np.empty_like(vertices)
+    here = np.empty_like(vertices)
+    there = np.empty_like(vertices)
     for k in range(count):
         if not loaded[k]:
             continue
@@ -180,14 +192,16 @@ def struck(
         if last[0] == rows[k, 0] and last[1] == rows[k, 1] and last[2] == rows[k, 2]:
             continue
         way = math.hypot(last[0] - rows[k, 0], last[1] - rows[k, 1])
-        a, b = offsets[k], offsets[k + 1]
+        a = offsets[k]
+        b = offsets[k + 1]
         for j in range(count):
             if loaded[j] or found[j]:
                 continue
             gap = math.hypot(rows[j, 0] - last[0], rows[j, 1] - last[1]) - radii[j] - radii[k]
             if gap > way:
                 continue
-            c, d = offsets[j], offsets[j + 1]
+            c = offsets[j]
+            d = offsets[j + 1]
             transform_points(rows[j], vertices[c:d], there[c:d])
             for t in range(steps):
                 pose = paths[t, k]

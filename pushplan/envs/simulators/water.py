@@ -27,13 +27,19 @@ def flow_shapes(
     count = offsets.shape[0] - 1
     out = np.zeros((count, 4))
     for k in range(count):
-        first, last = offsets[k], offsets[k + 1]
+        first = offsets[k]
+        last = offsets[k + 1]
         for i in range(first, last):
             j = i + 1 if i + 1 < last else first
-            ax, ay, bx, by = vertices[i, 0], vertices[i, 1], vertices[j, 0], vertices[j, 1]
-            ex, ey = bx - ax, by - ay
+            ax = vertices[i, 0]
+            ay = vertices[i, 1]
+            bx = vertices[j, 0]
+            by = vertices[j, 1]
+            ex = bx - ax
+            ey = by - ay
             long = math.hypot(ex, ey)
-            s, t = (ax * ex + ay * ey) / long, (bx * ex + by * ey) / long
+            s = (ax * ex + ay * ey) / long
+            t = (bx * ex + by * ey) / long
             cross = ax * by - ay * bx
             out[k, 0] += long / math.pi
             out[k, 1] += 0.5 * cross

@@ -72,10 +72,12 @@ class AreaClearingTask(ManipulationTask):
 
     def _static(self) -> StaticMap:
         """Walls around the room and beside the area, and columns; always the same."""
-        room, column = self._room, 0.5 * self.preset.column
+        room = self._room
+        column = 0.5 * self.preset.column
         x, y = room["outer"]
         parts = list(walls_around((-x, -y, x, y), self.preset.wall))
-        half, top = 0.5 * self.preset.inner_wall, room["area"][1]
+        half = 0.5 * self.preset.inner_wall
+        top = room["area"][1]
         parts += [rectangle(side - half, -top, side + half, top) for side in room["walls"]]
         parts += [
             rectangle(a - column, b - column, a + column, b + column) for a, b in room["columns"]
@@ -86,14 +88,16 @@ class AreaClearingTask(ManipulationTask):
         return self.static, False
 
     def _robot_poses(self, rng: np.random.Generator, static: StaticMap) -> FloatArray:
-        margin, half = self.preset.start_margin, self._room["area"][0]
+        margin = self.preset.start_margin
+        half = self._room["area"][0]
         # lower where something stands in front, such as a column
         y = margin * np.linspace(1.0, -1.0, 9) - self._room["area"][1]
         x = np.zeros(1)
         if self.variations.random_start:
             x = rng.uniform(margin - half, half - margin, START_TRIES // len(y))
         poses = np.full((len(x) * len(y), 3), 0.5 * np.pi)
-        poses[:, 0], poses[:, 1] = np.repeat(x, len(y)), np.tile(y, len(x))
+        poses[:, 0] = np.repeat(x, len(y))
+        poses[:, 1] = np.tile(y, len(x))
         return poses
 
     def _box_region(self) -> tuple[FloatArray, list[Any]]:
@@ -119,7 +123,8 @@ def open_edges(static: StaticMap, polygon: FloatArray, size: float) -> BoolArray
     Returns:
         (N,) flags for the edges from corner i to i + 1.
     """
-    free_space, bounds = FreeSpace(static), static.bounds
+    free_space = FreeSpace(static)
+    bounds = static.bounds
     found = np.zeros(len(polygon), dtype=bool)
     for i, (a, b) in enumerate(zip(polygon, np.roll(polygon, -1, axis=0), strict=True)):
         length = float(np.hypot(*(b - a)))

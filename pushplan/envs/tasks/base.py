@@ -145,8 +145,10 @@ class Task(ABC):
         Raises:
             ScenarioError: if there is no such robot, or the bumper does not fit it.
         """
-        preset, wanted = self.preset, self.variations
-        name, bumper = getattr(wanted, "robot", None), getattr(wanted, "bumper", None)
+        preset = self.preset
+        wanted = self.variations
+        name = getattr(wanted, "robot", None)
+        bumper = getattr(wanted, "bumper", None)
         name = next(iter(preset.robots)) if name is None else name
         solid = preset.materials.solids is not None  # then heights and wheels are asked for
         others = () if solid else sorted(robots().keys() - ROBOTS)
@@ -169,13 +171,15 @@ class Task(ABC):
 
     def _drive(self, robot: RobotModel) -> None:
         """Set robot, materials, control step and slowness: the preset and what departs from it."""
-        preset, wanted = self.preset, self.variations
+        preset = self.preset
+        wanted = self.variations
         frictions = {field: getattr(wanted, name, None) for name, field in _FRICTIONS.items()}
         asked = {field: value for field, value in frictions.items() if value is not None}
         self.materials = replace(preset.materials, **asked)
         self.robot = wanted.limit(robot)
         self.control_step = wanted.control_step or preset.control_step
-        speed, turn = robot.max_speed, robot.max_turn_rate
+        speed = robot.max_speed
+        turn = robot.max_turn_rate
         self.slowness = max(1.0, speed / self.robot.max_speed, turn / self.robot.max_turn_rate)
 
     @property

@@ -100,7 +100,8 @@ class BoxDeliveryTask(ManipulationTask):
         preset = self.preset
         wanted = int(rng.integers(1, preset.columns[self.variations.layout] + 1))
         margin = preset.column_margin + 0.5 * preset.column
-        low, high = np.array(self.bounds[:2]) + margin, np.array(self.bounds[2:]) - margin
+        low = np.array(self.bounds[:2]) + margin
+        high = np.array(self.bounds[2:]) - margin
         best: list[FloatArray] = []
         for _ in range(_COLUMN_TRIES):
             placed: list[FloatArray] = []
@@ -118,7 +119,8 @@ class BoxDeliveryTask(ManipulationTask):
         """A wall from +x that leaves a gap at -x, with triangles where it meets the wall."""
         fraction, thickness = self.preset.divider
         x0, y0, x1, y1 = self.bounds
-        margin, half = self.preset.divider_margin, 0.5 * thickness
+        margin = self.preset.divider_margin
+        half = 0.5 * thickness
         y = float(rng.uniform(y0 + margin, y1 - margin))
         wall = rectangle(x1 - fraction * (x1 - x0), y - half, x1, y + half)
         corners = ((np.array([x1, y + side * half]), side) for side in (1.0, -1.0))
@@ -132,7 +134,8 @@ class BoxDeliveryTask(ManipulationTask):
         ]
 
     def _robot_poses(self, rng: np.random.Generator, static: StaticMap) -> FloatArray:
-        low, high = self.bounds[:2], self.bounds[2:]
+        low = self.bounds[:2]
+        high = self.bounds[2:]
         if self.variations.random_start:
             poses: FloatArray = rng.uniform((*low, -np.pi), (*high, np.pi), (START_TRIES, 3))
             return poses
@@ -149,7 +152,8 @@ class BoxDeliveryTask(ManipulationTask):
         return those_inside(self._mouth, self._start, ids, poses) if len(ids) else ids
 
     def _measure(self, world: World) -> tuple[FloatArray, BoolArray]:
-        distances, done = np.zeros(self.box_count), np.ones(self.box_count, dtype=bool)
+        distances = np.zeros(self.box_count)
+        done = np.ones(self.box_count, dtype=bool)
         distances[world.movables.ids] = self.goal_distances(world.movables.poses)
         done[world.movables.ids] = False
         return distances, done

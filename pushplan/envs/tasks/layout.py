@@ -104,7 +104,8 @@ class FreeSpace:
         if count == 0:
             return np.zeros((0, 3))
         box = np.asarray(self.static.bounds if within is None else within, dtype=np.float64)
-        low, high = box[:2], box[2:]
+        low = box[:2]
+        high = box[2:]
         if not touching:
             keep_off = [*keep_off, *((shape, 0.0) for shape in robot)]
 
@@ -138,7 +139,8 @@ def _place(
     random_yaw: bool,
 ) -> FloatArray:
     """Squares at random, or on a lattice where that fails."""
-    low, high = box[:2], box[2:]
+    low = box[:2]
+    high = box[2:]
     if (high >= low).all() and count * size * size < float(np.prod(high - low + size)):
         placed = _throw(rng, count, box, fits, size + gap, spacing, random_yaw)
         if len(placed) == count:
@@ -168,7 +170,8 @@ def _moved_off(poses: FloatArray, size: float, body: Any) -> tuple[FloatArray, B
         away = poses[k, :2] - middle
         length = float(np.hypot(*away))
         away = away / length if length > 0.0 else np.array([1.0, 0.0])
-        near, far = 0.0, reach
+        near = 0.0
+        far = reach
         while far - near > _TOUCH * size:
             half = 0.5 * (near + far)
             moved[k, :2] = poses[k, :2] + half * away
@@ -225,7 +228,8 @@ def _lattice(
     pitch: float,
 ) -> FloatArray:
     """(N, 2) free centres of the best of some shifted square lattices."""
-    low, high = box[:2], box[2:]
+    low = box[:2]
+    high = box[2:]
     pitch = max(pitch * (1.0 + 1e-9), math.sqrt(float(np.prod(high - low)) / _LATTICE_CELLS))
     best = np.zeros((0, 2))
     for shift in rng.uniform(0.0, pitch, (_LATTICE_SHIFTS, 2)):

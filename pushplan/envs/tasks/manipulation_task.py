@@ -142,7 +142,8 @@ class ManipulationTask(Task):
     variations: ManipulationVariations
 
     def _prepare(self) -> None:
-        dimensions, wanted = self.preset, self.variations
+        dimensions = self.preset
+        wanted = self.variations
         robot = self._make_robot()
         self.heading_step = dimensions.heading_step
         self.waypoint_window = dimensions.windows[wanted.layout]
@@ -158,7 +159,8 @@ class ManipulationTask(Task):
         self.box_count = wanted.boxes or dimensions.boxes[wanted.layout]
         self.state_objects = max(self.state_objects, self.box_count)
         self._field: GeodesicField | None = None
-        self._idle_actions, self._idle_since = 0, 0.0
+        self._idle_actions = 0
+        self._idle_since = 0.0
         self._furnish_room()
 
     @abstractmethod
@@ -186,7 +188,8 @@ class ManipulationTask(Task):
         field = geodesic_field(static, self.goal, resolution=resolution)
         self._field = field
         self._farthest = float(field.values[np.isfinite(field.values)].max())
-        self._idle_actions, self._idle_since = 0, world.time
+        self._idle_actions = 0
+        self._idle_since = world.time
         self._start = world.movables
         self._seen = (world, *self._measure(world))
         return world
@@ -205,7 +208,8 @@ class ManipulationTask(Task):
 
     def _furnish(self, rng: np.random.Generator, static: StaticMap) -> World:
         """Robot and boxes among static obstacles; every box within the robot's reach."""
-        size, preset = self.box_size, self.preset
+        size = self.box_size
+        preset = self.preset
         free_space = FreeSpace(static)
         radius = self.robot.circumscribed_radius
         resolution = self.preset.field_resolution
@@ -296,7 +300,8 @@ class ManipulationTask(Task):
         """Whether nothing has been achieved for too long, after a step that ended in ``world``."""
         self._idle_actions += 1
         if progress:
-            self._idle_actions, self._idle_since = 0, world.time
+            self._idle_actions = 0
+            self._idle_since = world.time
         limit = self.variations.idle_limit
         if limit is None and self.action in self.idle_limits:
             return self._idle_actions >= self.idle_limits[self.action]
@@ -305,5 +310,6 @@ class ManipulationTask(Task):
 
     def _image(self, name: str) -> ImageObservation:
         """``"image"``, or ``"spatial"``, the same at fewer pixels."""
-        window, pixels = self.waypoint_window, _PIXELS[name]
+        window = self.waypoint_window
+        pixels = _PIXELS[name]
         return ImageObservation(_CHANNELS, (window, window), (pixels, pixels))

@@ -42,7 +42,8 @@ PRESETS = read_presets("maze")
 def walls(preset: Preset, shape: str) -> StaticMap:
     """The walls around the room and inside it, which make the way a U or a Z."""
     width, length = preset.rooms[shape]
-    half, bounds = preset.wall, (0.0, 0.0, width, length)
+    half = preset.wall
+    bounds = (0.0, 0.0, width, length)
     if preset.thick_lines:
         around = [
             (0.0, 0.0, width, 0.0),

@@ -64,7 +64,8 @@ class NamoTask(MazeTask):
     def start(self, rng: np.random.Generator) -> World:
         """A new start: rooms, doors and the boxes that hold them, the robot and the goal."""
         self._steps = 0
-        draw, unit = LAYOUTS[self.variations.layout], self.unit
+        draw = LAYOUTS[self.variations.layout]
+        unit = self.unit
         size = 1.0 if self.variations.box_size is None else self.variations.box_size / unit
         for _ in range(_TRIES):
             layout = draw(rng, size)
@@ -76,7 +77,8 @@ class NamoTask(MazeTask):
             if proves(world, opening):
                 self.opening = opening
                 assert isinstance(world.goal, GoalDisc)
-                self.static, self.goal = world.static, world.goal
+                self.static = world.static
+                self.goal = world.goal
                 self.__dict__.pop("field", None)
                 self.__dict__.pop("_farthest", None)
                 return world
@@ -86,7 +88,8 @@ class NamoTask(MazeTask):
         )
 
     def _world(self, rng: np.random.Generator, layout: NamoLayout) -> World:
-        unit, width = self.unit, ROOM[1]
+        unit = self.unit
+        width = ROOM[1]
         end = layout.bounds[2]
         robot = rng.uniform((1.2, 1.2, -np.pi), (3.0, width - 1.2, np.pi))
         goal = rng.uniform((end - 2.2, 1.5), (end - 1.5, width - 1.5))

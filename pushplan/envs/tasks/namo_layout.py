@@ -63,7 +63,8 @@ class NamoLayout:
         """Walls around and between the rooms, in metres."""
         walls = list(walls_around(self.bounds, 2.0 * WALL))
         for i, doors in enumerate(self.doors):
-            x, low = ROOM[0] * (i + 1), 0.0
+            x = ROOM[0] * (i + 1)
+            low = 0.0
             for door in sorted(doors):
                 walls.append(rectangle(x - WALL, low, x + WALL, door - DOOR))
                 low = door + DOOR
@@ -107,7 +108,8 @@ _HOLDS: tuple[Hold, ...] = (NamoLayout.plug, NamoLayout.pair, NamoLayout.bar)
 
 def _door(rng: np.random.Generator) -> float:
     """The middle of a door that a bar can be slid off to one side."""
-    low, high = rng.uniform(3.2, 3.9), rng.uniform(4.1, 4.8)
+    low = rng.uniform(3.2, 3.9)
+    high = rng.uniform(4.1, 4.8)
     return float(low if rng.random() < 0.5 else high)
 
 
@@ -153,7 +155,8 @@ def _squeeze(rng: np.random.Generator, size: float) -> NamoLayout:
     layout = NamoLayout(tuple((door,) for door in doors))
     layout.plug(rng, 0, doors[0], size)
     while len(layout.sizes) <= _CLUTTER:
-        x, y = rng.uniform(ROOM[0] + 1.0, 2.0 * ROOM[0] - 1.0), rng.uniform(0.6, ROOM[1] - 0.6)
+        x = rng.uniform(ROOM[0] + 1.0, 2.0 * ROOM[0] - 1.0)
+        y = rng.uniform(0.6, ROOM[1] - 0.6)
         if x > ROOM[0] + THROUGH + 1.5 * size or abs(y - doors[0]) > 0.5 + size:
             layout.add((size, size), float(x), float(y))
     return layout

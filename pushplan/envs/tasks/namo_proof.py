@@ -27,13 +27,15 @@ def proves(world: World, opening: Sequence[Opening]) -> bool:
         world: the start.
         opening: the steps, in order, in metres.
     """
-    robot, size = world.robot, world.robot.circumscribed_radius
+    robot = world.robot
+    size = world.robot.circumscribed_radius
     if not _is_sound(world, _GAP * size):
         return False
     if _reaches_goal(_components(world, robot.inscribed_radius), world):
         return False
     for step in opening:
-        by, boxes = np.array(step.by), list(step.boxes)
+        by = np.array(step.by)
+        boxes = list(step.boxes)
         heading = by / np.hypot(*by)
         moved = world.movables.poses.copy()
         corners = np.concatenate([world.movables.outline_world(k) for k in boxes])
@@ -56,7 +58,8 @@ def proves(world: World, opening: Sequence[Opening]) -> bool:
 
 def _components(world: World, radius: float) -> FreeComponents:
     """The free components of a disc of ``radius`` [m] among walls and boxes."""
-    objects, static = world.movables, world.static
+    objects = world.movables
+    static = world.static
     grid = Grid.cover(static.bounds, _CELL * world.robot.circumscribed_radius)
     outlines = [objects.outline_world(k) for k in range(len(objects))]
     everything = StaticMap.build([*static.polygons, *outlines], bounds=static.bounds)

@@ -118,7 +118,8 @@ class RoomTask(Task):
         self.objects_leave = isinstance(world.goal, Receptacle)
         if isinstance(world.goal, Receptacle | ClearanceArea):
             self.goal_kind = "objects"
-            self._way, is_done = self._way_of_objects(), bool(world.completed.all())
+            self._way = self._way_of_objects()
+            is_done = bool(world.completed.all())
         else:
             self._way = self._field.exact(*world.robot_pose[:2].tolist())
             is_done = self._way == 0.0
@@ -152,7 +153,8 @@ class RoomTask(Task):
 
     def start(self, rng: np.random.Generator) -> World:
         """The world of the file, with the robot and the objects moved a little if asked for."""
-        self._steps, self._idle_since = 0, 0
+        self._steps = 0
+        self._idle_since = 0
         return self._spread(rng) if self.variations.spread else self._world
 
     def _spread(self, rng: np.random.Generator) -> World:
@@ -160,8 +162,10 @@ class RoomTask(Task):
 
         Where nothing is free one stays.
         """
-        world, spread = self._world, self.variations.spread
-        free, floor = FreeSpace(world.static), shapely.box(*world.static.bounds)
+        world = self._world
+        spread = self.variations.spread
+        free = FreeSpace(world.static)
+        floor = shapely.box(*world.static.bounds)
         movables = world.movables
         outlines = [list(world.robot.contact_parts)]
         outlines += [[movables.outline(k)] for k in range(len(movables))]
@@ -184,7 +188,8 @@ class RoomTask(Task):
                     and free.is_free(np.array([shape, way]), 0.0).all()
                     and not shape.intersects(others)
                 ):
-                    poses[k], shapes[k] = pose, shape
+                    poses[k] = pose
+                    shapes[k] = shape
                     break
         return world.moved(robot_pose=poses[0], movable_poses=poses[1:])
 
@@ -196,7 +201,8 @@ class RoomTask(Task):
             return self._score_objects(before, after)
         near, far = (self._field.sample(*world.robot_pose[:2]) for world in (after, before))
         reward = PROGRESS_REWARD * (far - near - work / self._world.robot.mass) / self._way
-        at, bounds = after.robot_pose[:2], self._world.static.bounds
+        at = after.robot_pose[:2]
+        bounds = self._world.static.bounds
         failure = "wall" if touched_static else ""
         if not failure and ((at < bounds[:2]).any() or (at > bounds[2:]).any()):
             failure = "left_map"
@@ -204,7 +210,8 @@ class RoomTask(Task):
 
     def _score_objects(self, before: World, after: World) -> StepOutcome:
         self._steps += 1
-        was_done, done = self._done(before), self._done(after)
+        was_done = self._done(before)
+        done = self._done(after)
         gained = int(done.sum()) - int(was_done.sum())
         if gained > 0:
             self._idle_since = self._steps
@@ -225,7 +232,8 @@ class RoomTask(Task):
 
     def _checked_for_time(self, outcome: StepOutcome) -> StepOutcome:
         """The outcome, cut off after too long without progress."""
-        idle, limit = self._steps - self._idle_since, self.variations.idle_limit
+        idle = self._steps - self._idle_since
+        limit = self.variations.idle_limit
         if outcome.reason or limit is None or idle * self.control_step < limit * (1.0 - 1e-9):
             return outcome
         return replace(outcome, reason="no_progress", truncated=True)

@@ -85,12 +85,16 @@ class ShipIceTask(Task):
 
     def _prepare(self) -> None:
         self._make_robot()
-        preset, wanted = self.preset, self.variations
+        preset = self.preset
+        wanted = self.variations
         self._width, length = preset.channel
         first, last = preset.ice
         beyond = length - last
-        longer, away, x = wanted.channel_length, wanted.goal_distance, wanted.start_x
-        least, start = preset.goal_y + beyond, preset.start_y
+        longer = wanted.channel_length
+        away = wanted.goal_distance
+        x = wanted.start_x
+        least = preset.goal_y + beyond
+        start = preset.start_y
         if longer is not None and longer < least:
             raise ScenarioError(
                 f"ship_ice: channel_length must be at least {least:g} m, got {longer:g}"
@@ -123,7 +127,8 @@ class ShipIceTask(Task):
             field = load_ice(path, hull=self.variations.ice_hull, overlaps=overlaps)
         except InvalidInputError as error:
             raise ScenarioError(f"ship_ice: {error}") from error
-        low, high = self.static.bounds[:2], self.static.bounds[2:]
+        low = self.static.bounds[:2]
+        high = self.static.bounds[2:]
         for i, corners in enumerate(field.polygons):
             if (corners < low - 1e-9).any() or (corners > high + 1e-9).any():
                 raise ScenarioError(
@@ -154,7 +159,8 @@ class ShipIceTask(Task):
         )
 
     def _start_pose(self, rng: np.random.Generator) -> FloatArray:
-        margin, wanted = self.preset.side_margin, self.variations
+        margin = self.preset.side_margin
+        wanted = self.variations
         anywhere = rng.uniform(margin, self._width - margin)
         x = anywhere if wanted.start_x is None else wanted.start_x
         return np.array([x, self.preset.start_y, wanted.start_heading])
@@ -199,5 +205,6 @@ class ShipIceTask(Task):
         return self._driven(reward, after, failure="left_channel" if outside else "")
 
     def _image(self, name: str) -> ImageObservation:
-        side, pixels = self.preset.window, (_PIXELS, _PIXELS)
+        side = self.preset.window
+        pixels = (_PIXELS, _PIXELS)
         return ImageObservation(_IMAGE_CHANNELS, (side, side), pixels, True, self.preset.shift)

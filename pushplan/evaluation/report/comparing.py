@@ -149,9 +149,11 @@ def compare_runs(old: str | Path, new: str | Path, rules: str | Sequence[Rule]) 
         UnknownNameError: if there is no such column.
     """
     chosen = read_rules(rules) if isinstance(rules, str) else rules
-    before, after = _read(old), _read(new)
+    before = _read(old)
+    after = _read(new)
     found = []
-    old_rows, new_rows = grouped(before), grouped(after)
+    old_rows = grouped(before)
+    new_rows = grouped(after)
     for setting, policy in itertools.product(settings_of(before), policies_of(before)):
         mine = setting, policy
         for rule in chosen:
@@ -199,18 +201,23 @@ def _judge(
     change = float(gaps.mean())
     if paired:
         found = estimate(gaps)
-        low, high = found.low, found.high
+        low = found.low
+        high = found.high
     elif count < 2:
-        low, high = -math.inf, math.inf
+        low = -math.inf
+        high = math.inf
     elif np.ptp(old) == np.ptp(new) == 0.0:
-        low, high = change, change
+        low = change
+        high = change
     else:
         from scipy import stats
 
         welch = stats.ttest_ind(new, old, equal_var=False).confidence_interval()
-        low, high = float(welch.low) / (unit or 1.0), float(welch.high) / (unit or 1.0)
+        low = float(welch.low) / (unit or 1.0)
+        high = float(welch.high) / (unit or 1.0)
     sign = 1.0 if rule.above else -1.0
-    worst, best = max(sign * low, sign * high), min(sign * low, sign * high)
+    worst = max(sign * low, sign * high)
+    best = min(sign * low, sign * high)
     bound = sign * rule.bound
     verdict = "regressed" if best > bound else "ok" if worst <= bound else "unclear"
     if count < ENOUGH and (low != 0.0 or high != 0.0) and verdict != "ok":

@@ -19,7 +19,8 @@ _LETTERS = 26  # on a line of a cell
 _LINES = 36  # of a table on a page
 _PARTS = 3  # groups of columns on a page
 _FLOATS = 10  # tables that LaTeX is given before it has to place them
-_NARROW, _BROAD = frozenset("iljft.,:;'`|!()[]/ -1I"), frozenset("mwMW@%&<>=+~")
+_NARROW = frozenset("iljft.,:;'`|!()[]/ -1I")
+_BROAD = frozenset("mwMW@%&<>=+~")
 _CHARACTERS = read_data(Path(__file__).with_name("latex_symbols.json"))
 _SYMBOLS: dict[str, str] = _CHARACTERS["symbols"]
 _ACCENTS: dict[str, str] = _CHARACTERS["accents"]
@@ -88,12 +89,15 @@ def _parts(widths: Sequence[float], keys: int) -> list[list[int]]:
 
 def _pages(rows: Sequence[list[list[str]]], parts: int) -> Iterator[Sequence[list[list[str]]]]:
     """The rows of a table, as many at a time as a page has room for."""
-    first, height = 0, 3 * parts  # of the headings
+    # of the headings
+    first = 0
+    height = 3 * parts
     for i, row in enumerate(rows):
         lines = parts * max(map(len, row))
         if i > first and height + lines > _LINES:
             yield rows[first:i]
-            first, height = i, 3 * parts
+            first = i
+            height = 3 * parts
         height += lines
     yield rows[first:]
 

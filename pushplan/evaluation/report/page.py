@@ -55,7 +55,8 @@ def write_page(
     there: dict[str, int] = {}
     if replays == "embed":
         found = {row.job: text for row in rows if (text := packed(run, row)) is not None}
-        texts, there = list(found.values()), dict.fromkeys(found, 1)
+        texts = list(found.values())
+        there = dict.fromkeys(found, 1)
     elif replays == "beside":
         there = dict.fromkeys(write_beside(run, rows, folder), 2)
     pairs = [table for table in tables if table.title.startswith("Paired")]
@@ -102,7 +103,8 @@ def page_data(run: StoredRun, replays: Mapping[str, int]) -> dict[str, Any]:
         run: the rows.
         replays: job -> 1 for a replay in the page, 2 for one beside it.
     """
-    policies, settings = run.policies, list(run.titles)
+    policies = run.policies
+    settings = list(run.titles)
     scenarios: dict[str, int] = {}
     listed: list[tuple[str, int, int]] = []
     for row in run.rows:

@@ -92,7 +92,8 @@ def _tradeoff(run: StoredRun) -> Figure | None:
             xy = np.array(points, dtype=float)
             many = len(xy) > _MANY
             cloud = axes.scatter(*xy.T, s=10, alpha=0.35, linewidths=0, rasterized=many, **dots(i))
-            across, up = estimate(xy[:, 0]), estimate(xy[:, 1])
+            across = estimate(xy[:, 0])
+            up = estimate(xy[:, 1])
             bar = axes.errorbar(
                 across.mean,
                 up.mean,

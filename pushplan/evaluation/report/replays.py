@@ -22,7 +22,9 @@ FRAMES = 400
 """At most so many instants of an episode are kept."""
 PATH = 24
 """Of the path of a plan, at most so many points are kept."""
-_LENGTH, _ANGLE = 1e-3, 1e-3  # steps in which poses are kept [m], [rad]
+# steps in which poses are kept [m], [rad]
+_LENGTH = 1e-3
+_ANGLE = 1e-3
 _MOST = 2**15 - 1
 
 
@@ -60,7 +62,8 @@ def packed(run: StoredRun, row: ResultRow) -> str | None:
         return None
     if episode is None:
         return None
-    scene, motion = _scene(episode), _motion(episode)
+    scene = _scene(episode)
+    motion = _motion(episode)
     return json.dumps({"job": row.job, **scene, **motion, "plans": _plans(episode)})
 
 
@@ -122,11 +125,13 @@ def _motion(episode: Episode) -> dict[str, Any]:
 
 def _plans(episode: Episode) -> list[dict[str, Any]]:
     """When each plan was taken up, its path, and where it expects which objects at its end."""
-    plans, found = episode.plans, []
+    plans = episode.plans
+    found = []
     if plans is None:
         return []
     for index in thinned(len(plans), FRAMES).tolist():
-        path, (moved, poses) = plans.path(index), plans.expected(index)
+        path = plans.path(index)
+        (moved, poses) = plans.expected(index)
         kept = thinned(len(path), PATH)
         found.append(
             {

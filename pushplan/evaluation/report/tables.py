@@ -201,7 +201,8 @@ def difference_tables(
         cells: list[tuple[str, ...]] = []
         brief: dict[str, list[str]] = {}
         for pair in mine:
-            names, digits = f"{pair.second} - {pair.first}", _digits(pair.metric)
+            names = f"{pair.second} - {pair.first}"
+            digits = _digits(pair.metric)
             mean = f"{pair.difference.mean:+.{digits}f}"
             interval = _interval(pair.difference, digits, "+")
             star = " *" if pair.significant else ""
@@ -219,10 +220,12 @@ def difference_tables(
                     _more(pair),
                 )
             )
-        headings, note = _PAIR_HEADINGS, PAIR_NOTE
+        headings = _PAIR_HEADINGS
+        note = PAIR_NOTE
         if not wide and len(cells) > MANY_PAIRS:
             cells = [(names, *line) for names, line in brief.items()]
-            headings, note = ("pair", *map(heading, metrics)), BRIEF_NOTE
+            headings = ("pair", *map(heading, metrics))
+            note = BRIEF_NOTE
         title = f"Paired differences: {titles.get(setting, setting)}"
         tables.append(Table(title, headings, tuple(cells), note))
     return tables
@@ -258,7 +261,8 @@ def aggregate_table(rows: Sequence[ResultRow], policies: Sequence[str]) -> Table
     Returns:
         None if there is nothing to compare or only one setting.
     """
-    groups, settings = grouped(rows), settings_of(rows)
+    groups = grouped(rows)
+    settings = settings_of(rows)
     if len(settings) < 2:
         return None
     strata: dict[tuple[str, str], list[FloatArray]] = {}
@@ -278,8 +282,10 @@ def aggregate_table(rows: Sequence[ResultRow], policies: Sequence[str]) -> Table
     for label in policies:
         line = [label]
         for name in shown:
-            mine, base = strata.get((label, name)), strata.get((first, name))
-            middle, better = "", ""
+            mine = strata.get((label, name))
+            base = strata.get((first, name))
+            middle = ""
+            better = ""
             if mine:
                 found = interquartile_mean(mine)
                 middle = f"{found.value:.3f}\n{_interval(found, 3)}"

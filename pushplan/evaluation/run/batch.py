@@ -168,7 +168,8 @@ class _Batch:
                 # one job waits for each worker, so that none is idle while a row is stored
                 self._drain(pool.submit, 2 * window)
             return
-        settings, owner = self.settings, os.getpid()
+        settings = self.settings
+        owner = os.getpid()
 
         def submit(job: Job) -> Future[JobResult]:
             return executor.submit(execute, job, settings, owner)

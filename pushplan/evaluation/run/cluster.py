@@ -39,7 +39,8 @@ class DaskExecutor(Executor):
     """So many jobs are in hand at a time."""
 
     def __init__(self, client: Any, memory_limit_mb: float | None) -> None:
-        self._client, self._memory_limit_mb = client, memory_limit_mb
+        self._client = client
+        self._memory_limit_mb = memory_limit_mb
 
     def submit(self, function: Callable[..., Any], /, *arguments: Any, **_: Any) -> Future[Any]:
         """Queue one job: ``function`` is `execute`, ``arguments`` are job and settings."""
@@ -102,7 +103,8 @@ def dask_executor(where: str, memory_limit_mb: float | None) -> Iterator[DaskExe
             )
             client = distributed.Client(cluster)
         else:
-            cluster, client = None, distributed.Client(where, timeout=CONNECT_S)
+            cluster = None
+            client = distributed.Client(where, timeout=CONNECT_S)
     except (OSError, ValueError, RuntimeError) as error:
         raise ClusterError(f"there is no Dask scheduler at {where}: {describe(error)}") from error
     try:

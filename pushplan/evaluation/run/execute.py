@@ -107,8 +107,10 @@ def _execute(job: Job, settings: JobSettings) -> JobResult:
     recording = Recording(
         policy, job.scenario, job.policy.label, latency_factor=settings.latency_factor
     )
-    begin, began = time.perf_counter(), instant()
-    status, detail = Status.DONE, ""
+    begin = time.perf_counter()
+    began = instant()
+    status = Status.DONE
+    detail = ""
     try:
         # whoever looks at a policy later may look at what raises
         asked(lambda: [isinstance(policy, one) for one in _ABILITIES])
@@ -124,12 +126,14 @@ def _execute(job: Job, settings: JobSettings) -> JobResult:
     except (BatchStoppedError, MemoryError):
         raise
     except Exception as error:
-        status, reason = Status.ENV_ERROR, describe(error)
+        status = Status.ENV_ERROR
+        reason = describe(error)
         if isinstance(error, PolicyError):
             invalid = isinstance(error, InvalidActionError)
             status = Status.INVALID_ACTION if invalid else Status.POLICY_ERROR
             reason = str(error)
-        recording.reason, detail = clean_reason(reason), traceback.format_exc()
+        recording.reason = clean_reason(reason)
+        detail = traceback.format_exc()
     reason = clean_reason(recording.reason)
     row = replace(
         blank_row(job.policy.label, job.scenario, status, reason),

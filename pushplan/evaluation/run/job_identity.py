@@ -128,9 +128,11 @@ def same_but_versions(spec: Mapping[str, Any]) -> str:
 
 def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
     """What differs between two specifications, in words."""
-    changed, noted = [], []
+    changed = []
+    noted = []
     for section in ("policy", "scenario", "files", "settings", "versions"):
-        old, new = before.get(section, {}), now.get(section, {})
+        old = before.get(section, {})
+        new = now.get(section, {})
         # the source of a policy may have moved, its options are in its identity
         names = {"identity"} if section == "policy" else {*old, *new}
         for name in sorted(names):
@@ -153,7 +155,8 @@ def job_of(spec: Mapping[str, Any]) -> tuple[Job, JobSettings]:
     """
     from pushplan.scenarios import Scenario
 
-    policy, settings = spec["policy"], spec["settings"]
+    policy = spec["policy"]
+    settings = spec["settings"]
     if "source" not in policy:
         raise InvalidInputError(
             f"policy {policy['label']!r} was given as a Python object ({policy['identity']}): only "

@@ -76,7 +76,8 @@ def check_limits(workers: int, memory_mb: float | None) -> None:
         InvalidInputError: if there are too few file descriptors, or less memory than a worker may
             use.
     """
-    files, needed = resource.getrlimit(resource.RLIMIT_NOFILE)[0], 64 + 4 * workers
+    files = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+    needed = 64 + 4 * workers
     if files != resource.RLIM_INFINITY and files < needed:
         raise InvalidInputError(
             f"{workers} workers need {needed} file descriptors and the limit is {files}: raise it "

@@ -32,7 +32,8 @@ def note_batch(
     titles: dict[str, str] = {}
     for job in jobs:
         assert job.spec is not None
-        label, setting = job.policy.label, setting_of(*job.key[1:])
+        label = job.policy.label
+        setting = setting_of(*job.key[1:])
         policies[label] = job.spec["policy"]["identity"]
         stop = job.policy.options.get("stop")
         if isinstance(stop, Stop) and math.isfinite(stop.seconds):
@@ -51,7 +52,8 @@ def pending_jobs(jobs: Sequence[Job], store: RunDirectory, any_version: bool) ->
     done = {one.row.job: one.row.job for one in stored}
     if any_version:
         done |= {same_but_versions(one.spec): one.row.job for one in stored if one.spec}
-    shown, pending = [], []
+    shown = []
+    pending = []
     for job in jobs:
         names = [job.id, *([same_but_versions(job.spec)] if any_version and job.spec else [])]
         if (there := next((done[name] for name in names if name in done), None)) is None:
@@ -95,7 +97,8 @@ def _hide_outdated(
     for one in stored:
         if not one.spec:  # saved from a CSV file, which does not say how it came about
             continue
-        row, identity = one.row, one.spec.get("policy", {}).get("identity")
+        row = one.row
+        identity = one.spec.get("policy", {}).get("identity")
         way = [one.spec.get(name) for name in names]
         changed = policies.get(row.policy, identity) != identity
         if changed or ways.get((row.policy, setting_of(row.scenario, row.seed)), way) != way:

@@ -311,7 +311,8 @@ def _parse_text(given: str, kind: str, names: Sequence[str]) -> PolicySpec:
 
     label, equals, source = given.partition("=")
     if not equals:
-        label, source = "", given
+        label = ""
+        source = given
     if source.startswith(LEARNED_PREFIXES):
         path = learned_file(source)
         name = re.sub(r"[^A-Za-z0-9_.+@-]", "_", path.stem).lstrip(".+@-")[:64]

@@ -81,7 +81,9 @@ class WorkerPool:
             memory_limit_mb=memory_limit_mb,
             trace_after_s=limit_s,
         )
-        self._most, self._settings, self._log_dir = workers, settings, log_dir
+        self._most = workers
+        self._settings = settings
+        self._log_dir = log_dir
         self._limit_s = math.inf if limit_s is None else limit_s
         self._calls: deque[_Call] = deque()
         self._threads: list[threading.Thread] = []  # one for each worker
@@ -204,7 +206,8 @@ def outcome_of(job: Job, future: Future[JobResult], settings: JobSettings) -> Jo
     try:
         return future.result().checked(job)
     except WorkerDiedError as error:
-        reason, detail = str(error), f"{error}\n{error.log}"
+        reason = str(error)
+        detail = f"{error}\n{error.log}"
         if error.status is Status.TIMEOUT:
             reason = timeout_reason(settings.timeout_s)
             detail = f"The process did not react and was ended.\n{error.log}"

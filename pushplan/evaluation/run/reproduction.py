@@ -87,7 +87,8 @@ def _differing_parts(first: Episode | None, second: Episode | None) -> list[str]
         return [] if first is second else ["episode"]
     same = {}
     for name in (*_ARRAYS, *_TIMES):
-        one, two = getattr(first, name), getattr(second, name)
+        one = getattr(first, name)
+        two = getattr(second, name)
         timed = name in _TIMES  # which are never the same, but as many
         same[name] = len(one) == len(two) if timed else np.array_equal(one, two, equal_nan=True)
     same["plans"] = first.plans == second.plans

@@ -73,9 +73,11 @@ class WorkerProcess:
     def __init__(self, setup: WorkerSetup, log: Path | None) -> None:
         self.group: str | None = None  # of the calls that it answers; None before the first
         self._setup = setup
-        self._log, self._log_start = log, 0
+        self._log = log
+        self._log_start = 0
         ours, theirs = socket.socketpair()
-        self._line, self._heard = ours, bytearray()
+        self._line = ours
+        self._heard = bytearray()
         self._mark = secrets.token_hex(16)
         environment = {**os.environ, WORKER_VARIABLE: self._mark, "PYTHONUNBUFFERED": "1"}
         environment.update(dict.fromkeys(THREAD_VARIABLES, "1"))
@@ -258,7 +260,8 @@ class WorkerProcess:
             os.truncate(self._log, 0)
             with self._log.open("ab") as file:
                 file.write(tail.encode())
-            self._log_start, size = 0, len(tail)
+            self._log_start = 0
+            size = len(tail)
         return size
 
     def _tail(self) -> str:

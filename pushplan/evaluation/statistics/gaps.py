@@ -36,7 +36,8 @@ class Gap:
 
 def total_work(row: ResultRow, known: KnownBounds) -> float | None:
     """m₀ l₀ + Σ mᵢ lᵢ of an episode that succeeded [kg m], else None."""
-    length, work = row.metrics.get("path_length_m"), row.metrics.get("interaction_work_kg_m")
+    length = row.metrics.get("path_length_m")
+    work = row.metrics.get("interaction_work_kg_m")
     if row.failed or not row.success or length is None or work is None:
         return None
     return known.robot_mass * length + work
@@ -50,7 +51,8 @@ def gaps(
     groups = grouped(rows)
     for setting in sorted(settings_of(rows)):
         for policy in policies_of(rows, policies):
-            to_bound, to_best = [], []
+            to_bound = []
+            to_best = []
             for row in groups.get((setting, policy), []):
                 mine = bounds.get(row.scenario)
                 if mine is None or (work := total_work(row, mine)) is None or mine.bound <= 0.0:

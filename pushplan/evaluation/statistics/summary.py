@@ -147,7 +147,8 @@ def paired_differences(
     compared = list(itertools.combinations(policies_of(rows, order), 2))
     if choice("pairs", pairs, PAIRS) == "first":
         compared = [pair for pair in compared if pair[0] == compared[0][0]]
-    groups, settings = grouped(rows), settings_of(rows)
+    groups = grouped(rows)
+    settings = settings_of(rows)
     found: list[PairedDifference] = []
     for metric in ("success", *metric_names(Role.SCORE, Role.DETAIL)):
         if (higher := METRICS[metric].higher_is_better) is None:
@@ -160,7 +161,8 @@ def paired_differences(
         gaps: dict[tuple[str, str, str], FloatArray] = {}
         for setting in settings:
             for first, second in compared:
-                one, two = values.get((setting, first), {}), values.get((setting, second), {})
+                one = values.get((setting, first), {})
+                two = values.get((setting, second), {})
                 if common := sorted(one.keys() & two.keys()):
                     gaps[setting, first, second] = np.array([two[k] - one[k] for k in common])
         tested = [signed_rank_test(gap) for gap in gaps.values()]

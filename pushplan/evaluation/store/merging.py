@@ -52,7 +52,8 @@ def merge(out: str | Path, sources: Sequence[str | Path]) -> Merged:
         database_of(folder)
         if folder.resolve() == Path(out).resolve():
             raise InvalidInputError(f"{folder} cannot be merged into itself")
-    added, known = 0, 0
+    added = 0
+    known = 0
     differing: list[str] = []
     incomplete: list[str] = []
     with RunDirectory(out) as store:

@@ -117,7 +117,8 @@ def package_digest() -> str:
     digest = hashlib.sha256()
     for path in sorted(root.rglob("*")):
         where = path.relative_to(root)
-        name, rooms = where.as_posix(), {where.parts[0], "/".join(where.parts[:2])}
+        name = where.as_posix()
+        rooms = {where.parts[0], "/".join(where.parts[:2])}
         rooms |= {name.removesuffix(".py")}
         left_out = rooms & UNSEEN or path.suffix == ".md" or name.startswith(".")
         if path.is_file() and "__pycache__" not in where.parts and not left_out:

@@ -187,7 +187,8 @@ def column_type(name: str) -> str:
 
 def rows_csv(rows: Sequence[ResultRow], more: Mapping[str, Sequence[object]] | None = None) -> str:
     """The rows as CSV with a header, and further columns behind."""
-    names, more = columns(), more or {}
+    names = columns()
+    more = more or {}
     lines = []
     for row, *rest in zip(rows, *more.values(), strict=True):
         values = [*(getattr(row, name) for name in names), *rest]
@@ -254,7 +255,8 @@ def checked_row(row: ResultRow) -> ResultRow:
         if value is not None and not 0.0 <= _number(name, value) < math.inf:
             raise ValueError(f"{name} is {value!r:.60}")
     for name, value in row.metrics.items():
-        low, high = METRICS[name].low, METRICS[name].high
+        low = METRICS[name].low
+        high = METRICS[name].high
         if not low - _ROUNDING <= _number(name, value) <= high + _ROUNDING or math.isinf(value):
             raise ValueError(f"{name} is {value:.6g}, not between {low:g} and {high:g}")
     return replace(row, reason=clean_reason(row.reason), host=clean_reason(row.host)[:64])
@@ -304,7 +306,8 @@ def scored_row(row: ResultRow, episode: Episode, plan_calls: int | None) -> Resu
         for name, value in compute(episode, names).items()
     }
     times: dict[str, float] = {}
-    calls, decisions = episode.plan_times_s, episode.act_times_s
+    calls = episode.plan_times_s
+    decisions = episode.act_times_s
     if plan_calls is not None and len(calls):
         times["plan_time_median_s"] = float(np.median(calls))
         times["plan_time_p99_s"] = float(np.percentile(calls, 99.0))

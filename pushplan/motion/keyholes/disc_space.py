@@ -37,7 +37,10 @@ class DiscSpace:
         closed_cost: float,
         stopped: Callable[[], bool] = never,
     ) -> None:
-        self.world, self.radius, self.cell, self.closed_cost = world, radius, cell, closed_cost
+        self.world = world
+        self.radius = radius
+        self.cell = cell
+        self.closed_cost = closed_cost
         self.stopped = stopped
         self.grid = Grid.cover(world.static.bounds, cell)
         x, y = np.meshgrid(self.grid.x, self.grid.y)
@@ -99,7 +102,8 @@ class DiscState:
     robot: FloatArray
 
     def __init__(self, space: DiscSpace, poses: FloatArray) -> None:
-        self.space, self.poses = space, poses
+        self.space = space
+        self.poses = poses
         self.clearance: FloatArray = space.static.copy()
         for k, pose in enumerate(poses):
             go_on(space.stopped)
@@ -198,8 +202,10 @@ class DiscState:
     def _corners(self, cells: IntArray, end: FloatArray) -> FloatArray:
         """The corners that are left of a path along cells where the disc can go straight."""
         points = self.space.points(cells)
-        points[0], points[-1] = self.robot[:2], end[:2]
-        kept, at = [0], 0
+        points[0] = self.robot[:2]
+        points[-1] = end[:2]
+        kept = [0]
+        at = 0
         while at < len(points) - 1:
             ahead = len(points) - 1
             while ahead > at + 1 and not self._sees(points[at], points[ahead]):

@@ -99,7 +99,8 @@ def suits_keyholes(world: World, config: KeyholeConfig) -> bool:
         world: the scene.
         config: parameters.
     """
-    robot, static = world.robot, world.static
+    robot = world.robot
+    static = world.static
     sides = (static.bounds[2:] - static.bounds[:2]) / (config.cell * robot.circumscribed_radius)
     return (
         robot.drive is Drive.DIFFERENTIAL
@@ -123,7 +124,8 @@ def _disc_space(
     world: World, config: KeyholeConfig, stopped: Callable[[], bool] = never
 ) -> DiscSpace:
     size = world.robot.circumscribed_radius
-    radius, cell = config.clearance * size, config.cell * size
+    radius = config.clearance * size
+    cell = config.cell * size
     return DiscSpace(world, radius, cell, config.closed_cost, stopped)
 
 
@@ -153,7 +155,9 @@ class KeyholeSearch:
         interaction: InteractionModel,
         stopped: Callable[[int], bool],
     ) -> None:
-        self.world, self.config, self.interaction = world, config, interaction
+        self.world = world
+        self.config = config
+        self.interaction = interaction
         self.expansions = 0
         count = self._count = [0]  # apart, so that the space does not hold the search
         size = world.robot.circumscribed_radius
@@ -214,12 +218,14 @@ class KeyholeSearch:
 
     def _hits_wall(self, path: FloatArray) -> bool:
         """Whether the robot gets deeper into something static on poses (N, 3) than at the first."""
-        shape, scratch = self._bare, np.empty_like(self._bare.vertices)
+        shape = self._bare
+        scratch = np.empty_like(self._bare.vertices)
         first, *others = (static_depth(pose, shape, self._walls, scratch) for pose in owned(path))
         return any(depth > first + 1e-9 for depth in others)
 
     def _put(self, end: KeyholeEnd) -> None:
-        state, cell = end.state, 2.0 * self._space.cell
+        state = end.state
+        cell = 2.0 * self._space.cell
         label = np.flatnonzero(state.reached.ravel())[:1]
         key = np.rint(state.poses / (cell, cell, 0.3)).tobytes() + label.tobytes()
         if key in self._seen:
@@ -251,20 +257,23 @@ class KeyholeSearch:
         """Whether object ``k`` is in the way of pushes of the first object on the path."""
         if not on_path or k in on_path:
             return False
-        here, there = end.state.poses[k, :2], end.state.poses[on_path[0], :2]
+        here = end.state.poses[k, :2]
+        there = end.state.poses[on_path[0], :2]
         reach = self.world.movables.radii[k] + self.world.movables.radii[on_path[0]]
         return math.dist(here, there) < float(reach) + 2.0 * self._size
 
     def _path(self, start: FloatArray, lead: float) -> FloatArray:
         """(N, 3) poses of a push to the contact, which has index `_CONTACT`, and on."""
-        spacing, longest = _SPACING * self._size, self.config.longest * self._size
+        spacing = _SPACING * self._size
+        longest = self.config.longest * self._size
         on = lead + np.arange(1, round(longest / spacing) + 1) * _SPACING * self._size
         return _straight(start, np.concatenate([np.linspace(0.0, lead, _CONTACT + 1), on]))
 
     def _push(self, end: KeyholeEnd, k: int, path: FloatArray, rank: int) -> Iterator[KeyholeEnd]:
         """The scenes after a push of object ``k``, ended where it opens one, or in a later rank."""
         self._count[0] += 1
-        config, size = self.config, self._size
+        config = self.config
+        size = self._size
         free = first_blocked(
             owned(path), len(path), self._shape, self._walls, np.empty_like(self._shape.vertices)
         )
@@ -291,10 +300,12 @@ class KeyholeSearch:
         self, end: KeyholeEnd, k: int, path: FloatArray, poses: FloatArray
     ) -> KeyholeEnd | None:
         """The scene after a push (N, 3) of object ``k``, objects (N, K, 3); the robot backs off."""
-        config, moved = self.config, poses[-1]
+        config = self.config
+        moved = poses[-1]
         if np.array_equal(moved[k], end.state.poses[k]):
             return None
-        cell, driven = self._space.cell, path_length(path)
+        cell = self._space.cell
+        driven = path_length(path)
         state = DiscState(self._space, moved)
         for back in np.arange(cell, driven, cell):
             away = _straight(path[-1], -np.linspace(0.0, back, int(back / cell) + 2)[1:])

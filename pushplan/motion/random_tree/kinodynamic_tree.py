@@ -55,10 +55,13 @@ def steer(
     Where it may lead back there are seven more, whose lengths are negative.
     """
     bound, longest, spacing, turn_weight, backward = limits
-    dx, dy = target[0] - start[0], target[1] - start[1]
+    dx = target[0] - start[0]
+    dy = target[1] - start[1]
     side = -np.sin(start[2]) * dx + np.cos(start[2]) * dy
     aimed = 2.0 * side / max(dx * dx + dy * dy, 1e-12)  # the circle through both, tangent here
-    best, best_curvature, best_length = np.inf, 0.0, 0.0
+    best = np.inf
+    best_curvature = 0.0
+    best_length = 0.0
     pose = np.empty(3)
     for arc in range(14 if backward > 0.0 else 7):
         i = arc % 7
@@ -79,7 +82,9 @@ def steer(
             miss = np.sqrt((pose[0] - target[0]) ** 2 + (pose[1] - target[1]) ** 2)
             miss += turn_weight * turn
             if miss < best:
-                best, best_curvature, best_length = miss, curvature, length
+                best = miss
+                best_curvature = curvature
+                best_length = length
                 copy_into(out, pose)
     return best_curvature, best_length
 
@@ -97,7 +102,9 @@ class TreeGrowth:
 
     def __post_init__(self) -> None:
         self.scratch = np.empty_like(self.shape.vertices)
-        self.origin, self.end, self.target = np.empty(3), np.empty(3), np.empty(3)
+        self.origin = np.empty(3)
+        self.end = np.empty(3)
+        self.target = np.empty(3)
         self.moved = True  # OMPL asks whether the start is valid before anything moves
 
     def grow(
@@ -159,10 +166,12 @@ class TreeGrowth:
         self, state: base.State, action: control.Control, duration: float, result: base.State
     ) -> None:
         """Drive towards the target; the control becomes the curvature that was driven."""
-        limits, back = self.limits, state[_DRIVEN][_BACK]
+        limits = self.limits
+        back = state[_DRIVEN][_BACK]
         if limits.backward > 0.0:
             limits = limits._replace(backward=limits.backward - back)
-        self.origin[0], self.origin[1] = state[_PLACE][0], state[_PLACE][1]
+        self.origin[0] = state[_PLACE][0]
+        self.origin[1] = state[_PLACE][1]
         self.origin[2] = state[_HEADING].value
         curvature, length = steer(
             self.origin,

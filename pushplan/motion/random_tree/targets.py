@@ -20,7 +20,8 @@ class Targets:
     rng: np.random.Generator
 
     def __post_init__(self) -> None:
-        coarse, index = self.coarse, np.arange(len(self.coarse))
+        coarse = self.coarse
+        index = np.arange(len(self.coarse))
         ahead = coarse[np.minimum(index + 3, len(coarse) - 1)]
         behind = coarse[np.maximum(index - 3, 0)]
         self.headings = np.arctan2(ahead[:, 1] - behind[:, 1], ahead[:, 0] - behind[:, 0])
@@ -30,18 +31,21 @@ class Targets:
     def __call__(self) -> FloatArray:
         """The next target (3,)."""
         if self.used == len(self.block):
-            self.block, self.used = self._draw(128), 0
+            self.block = self._draw(128)
+            self.used = 0
         self.used += 1
         target: FloatArray = self.block[self.used - 1]
         return target
 
     def _draw(self, count: int) -> FloatArray:
-        rng, bounds = self.rng, self.bounds
+        rng = self.rng
+        bounds = self.bounds
         near = rng.random(count) < self.fraction
         index = rng.integers(len(self.coarse), size=count)
         offsets = rng.standard_normal((count, 3)) * [self.spread, self.spread, 0.4]
         coarsed = np.column_stack([self.coarse[index], self.headings[index]]) + offsets
         spread = rng.random((count, 3))
-        low, high = [*bounds[:2], -np.pi], [*bounds[2:], np.pi]
+        low = [*bounds[:2], -np.pi]
+        high = [*bounds[2:], np.pi]
         uniform = low + spread * (np.asarray(high) - low)
         return np.where(near[:, None], coarsed, uniform)

@@ -39,7 +39,8 @@ class TreePaths:
         self,
         improver: PathImprover,  # of this planning call
     ) -> None:
-        self._improver, self._fraction = improver, _COARSE_PATH_FRACTION
+        self._improver = improver
+        self._fraction = _COARSE_PATH_FRACTION
         self._exact: FloatArray | None = None
         self.trees = 0
         self.sealed = False
@@ -71,7 +72,8 @@ class TreePaths:
         may do so, by two turning radii and twice as far each time. The first time it is found out
         whether the robot is `boxed_in`.
         """
-        improver, robot = self._improver, self._improver.world.robot
+        improver = self._improver
+        robot = self._improver.world.robot
         turned = len(improver.lead.pieces) > 0
         improver.begin_with(None if turned else start_turn(improver))
         if not robot.can_stop:
@@ -104,11 +106,15 @@ class TreePaths:
         budget: int,
     ) -> Candidate | None:
         """The path of a new tree."""
-        improver, world, problem = self._improver, self._improver.world, self._improver.problem
-        config, size = improver.config, improver.size
+        improver = self._improver
+        world = self._improver.world
+        problem = self._improver.problem
+        config = improver.config
+        size = improver.size
         self.trees += 1
         improver.iterations += 1
-        among, shape = problem.walls, problem.footprint
+        among = problem.walls
+        shape = problem.footprint
         if np.isinf(push_weight):
             boxes = unflatten(world.movables.vertices_world, world.movables.offsets)
             among = obstacles(keep_out(world), boxes)
@@ -154,7 +160,8 @@ class TreePaths:
         """A path around the walls alone, where the coarse grid misses a narrow passage."""
         world = self._improver.world
         graph = VisibilityGraph(keep_out(world), world.robot.inscribed_radius)
-        start, improver = world.robot_pose[:2], self._improver
+        start = world.robot_pose[:2]
+        improver = self._improver
         corners = graph.to_goal(start, improver.goal, improver.stopped).points
         if len(corners) == 0:
             return world.robot_pose[None, :2]

@@ -41,7 +41,8 @@ def _extent(outline: FloatArray, axis: int) -> tuple[float, float]:
     """Least and greatest coordinate of corners (N, 2)."""
     low = high = outline[0, axis]
     for i in range(1, outline.shape[0]):
-        low, high = min(low, outline[i, axis]), max(high, outline[i, axis])
+        low = min(low, outline[i, axis])
+        high = max(high, outline[i, axis])
     return low, high
 
 
@@ -49,14 +50,16 @@ def _extent(outline: FloatArray, axis: int) -> tuple[float, float]:
 def add_floes(floes: PlacedFloes, grid: FloatArray) -> None:
     """Add the cost of each floe to the cells (rows, columns) whose centres it covers."""
     rows, columns = grid.shape
-    exponent, soft = floes.costs.exponent, floes.costs.soft
+    exponent = floes.costs.exponent
+    soft = floes.costs.soft
     for k in range(floes.radii.shape[0]):
         outline = floes.outlines[floes.offsets[k] : floes.offsets[k + 1]]
         top, bottom = _extent(outline, 0)
         cost = floes.costs.totals[k]
         if cost == 0.0 or bottom < 0.0 or top > rows - 1:
             continue
-        first_row, last_row = int(np.ceil(top)), int(np.floor(bottom))
+        first_row = int(np.ceil(top))
+        last_row = int(np.floor(bottom))
         total = 0.0
         square = 1.0 / max(floes.radii[k] * floes.radii[k], 1e-12)
         for fill in range(2):  # weigh all cells of the floe, then fill those on the map
@@ -80,7 +83,8 @@ def add_floes(floes: PlacedFloes, grid: FloatArray) -> None:
                     elif 0 <= column < columns:
                         grid[row, column] += scale * weight
             if total == 0.0:  # a sliver between the centres of cells
-                row, column = int(np.round(floes.centres[k, 0])), int(np.round(floes.centres[k, 1]))
+                row = int(np.round(floes.centres[k, 0]))
+                column = int(np.round(floes.centres[k, 1]))
                 if 0 <= row < rows and 0 <= column < columns:
                     grid[row, column] += cost
                 break
@@ -89,14 +93,20 @@ def add_floes(floes: PlacedFloes, grid: FloatArray) -> None:
 @kernel
 def _columns_near(outline: FloatArray, row: float, margin: float) -> tuple[float, float]:
     """Least and greatest column of a convex outline within ``margin`` of a row; (0, -1): none."""
-    least, most, count = np.inf, -np.inf, outline.shape[0]
+    least = np.inf
+    most = -np.inf
+    count = outline.shape[0]
     for i in range(count):
         j = i + 1 if i + 1 < count else 0
-        a, b = outline[i, 0] - row, outline[j, 0] - row
-        low, high = 0.0, 1.0
+        a = outline[i, 0] - row
+        b = outline[j, 0] - row
+        low = 0.0
+        high = 1.0
         if a != b:
-            u, v = (-margin - a) / (b - a), (margin - a) / (b - a)
-            low, high = max(low, min(u, v)), min(high, max(u, v))
+            u = (-margin - a) / (b - a)
+            v = (margin - a) / (b - a)
+            low = max(low, min(u, v))
+            high = min(high, max(u, v))
         elif abs(a) > margin:
             continue
         if low <= high:
@@ -126,11 +136,14 @@ def block(
             left = max(int(np.floor(low - margin)), 0)
             right = min(int(np.ceil(high + margin)), columns - 1)
             for column in range(left, right + 1):
-                inside, near = True, np.inf
+                inside = True
+                near = np.inf
                 for i in range(count):
                     j = i + 1 if i + 1 < count else 0
-                    ex, ey = outline[j, 0] - outline[i, 0], outline[j, 1] - outline[i, 1]
-                    px, py = row - outline[i, 0], column - outline[i, 1]
+                    ex = outline[j, 0] - outline[i, 0]
+                    ey = outline[j, 1] - outline[i, 1]
+                    px = row - outline[i, 0]
+                    py = column - outline[i, 1]
                     if ex * py - ey * px < 0.0:
                         inside = False
                     t = min(max((px * ex + py * ey) / (ex * ex + ey * ey), 0.0), 1.0)

@@ -31,7 +31,8 @@ class Frame:
     @property
     def rotation(self) -> FloatArray:
         """(2, 2) its axes in the world frame, as columns."""
-        c, s = np.cos(self.angle), np.sin(self.angle)
+        c = np.cos(self.angle)
+        s = np.sin(self.angle)
         return np.array([[c, -s], [s, c]])
 
     def from_world(self, points_world: FloatArray) -> FloatArray:

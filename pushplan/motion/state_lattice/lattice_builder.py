@@ -63,7 +63,10 @@ class LatticeBuilder:
     stopped: Callable[[], bool] = never  # ends the work with `Stopped`
 
     def __post_init__(self) -> None:
-        world, config, radius, robot = self.world, self.config, self.radius, self.world.robot
+        world = self.world
+        config = self.config
+        radius = self.radius
+        robot = self.world.robot
         # the radius is a whole number of steps, so that few sets of primitives are ever needed
         wanted = config.step * 2.0 * max(robot.inscribed_radius, 0.1 * robot.circumscribed_radius)
         ratio = float(min(max(round(radius / wanted), 2), 40))
@@ -89,10 +92,14 @@ class LatticeBuilder:
         away = goal.distance(*(float(v) for v in self.world.robot_pose[:2]))
         corners = self.world.static.bounds[[[0, 1], [2, 1], [2, 3], [0, 3]]]
         box = self.frame.from_world(np.clip(corners, -1e9, 1e9)) / self.step
-        low, high = np.minimum(box.min(axis=0), 0.0), np.maximum(box.max(axis=0), 0.0)
+        low = np.minimum(box.min(axis=0), 0.0)
+        high = np.maximum(box.max(axis=0), 0.0)
         if isinstance(goal, GoalDisc):  # the path around walls may lead anywhere
-            self.arrives, self.ahead = True, away / self.step
-            behind, rows_ahead, far = -low[0], high[0], np.inf
+            self.arrives = True
+            self.ahead = away / self.step
+            behind = -low[0]
+            rows_ahead = high[0]
+            far = np.inf
         else:
             behind, rows_ahead, far = self._along(away, low, high)
         sides = [min(extent, far) for extent in (-low[1], high[1])]
@@ -103,7 +110,8 @@ class LatticeBuilder:
             aside = max(math.ceil(0.3 * self.ahead), 20)
             most = (aside, math.ceil(self.ahead) + aside, aside, aside)
             reach = [min(pair) for pair in zip(reach, most, strict=True)]
-        self.rows, self.columns = reach[0] + reach[1] + 1, reach[2] + reach[3] + 1
+        self.rows = reach[0] + reach[1] + 1
+        self.columns = reach[2] + reach[3] + 1
         self.start = (reach[0], reach[2])
 
     def _along(self, away: float, low: FloatArray, high: FloatArray) -> tuple[float, float, float]:
@@ -156,7 +164,9 @@ class LatticeBuilder:
     @cached_property
     def _common(self) -> tuple[PoseLattice, FloatArray]:
         """A lattice without costs of floes, and the sums of those costs."""
-        robot, step, grid = self.world.robot, self.step, self._map
+        robot = self.world.robot
+        step = self.step
+        grid = self._map
         outlines = robot.vertices / step
         covered = swaths(self.motions, outlines, robot.offsets, self.cells, self.stopped)
         stride = grid.shape[0] + 1
@@ -196,7 +206,8 @@ class LatticeBuilder:
         """What `PoseLattice` knows about the cost to a line; nothing for a disc."""
         if isinstance(self.world.goal, GoalDisc):
             return lattice.row_bounds, lattice.place_costs
-        cells, goal_row = self.cells, self.start[0] + self.ahead
+        cells = self.cells
+        goal_row = self.start[0] + self.ahead
         reach = int(lattice.corner[0])
         distances = np.maximum(goal_row - np.arange(float(self.rows)), 0.0) * self.step
         lengths = dubins_to_line(distances[None], self.motions.angles[:, None], self.radius)

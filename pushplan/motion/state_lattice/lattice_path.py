@@ -21,7 +21,8 @@ def sample_arcs(
     """(N, 3) poses along (E, 2) arcs from a pose on, and the (N,) curvatures [1/m] to each."""
     turn = float(np.abs(arcs[:, 0] * arcs[:, 1]).sum())
     capacity = int(arcs[:, 0].sum() / spacing + turn / 0.1) + 2 * len(arcs) + 8
-    poses, curvatures = np.empty((capacity, 3)), np.zeros(capacity)
+    poses = np.empty((capacity, 3))
+    curvatures = np.zeros(capacity)
     poses[0] = start
     count = 1 + sample_pieces(owned(start), arcs, spacing, poses[1:], curvatures[1:])
     return poses[:count], curvatures[:count]
@@ -45,7 +46,8 @@ def lay_path(
         numbers = goal_numbers(goal, config.inset * size)
         inside = np.flatnonzero([in_goal(x, y, numbers) for x, y in poses[:, :2]])
     end = int(inside[0]) + 1 if len(inside) else len(poses)
-    poses, curvatures = poses[:end].copy(), curvatures[:end].copy()
+    poses = poses[:end].copy()
+    curvatures = curvatures[:end].copy()
     if isinstance(goal, GoalLine) and len(inside) and end > 1:
         _cut_at_line(poses, float(curvatures[-1]), spacing, point, normal)
     return poses, curvatures
@@ -55,8 +57,10 @@ def _cut_at_line(
     poses: FloatArray, curvature: float, spacing: float, point: FloatArray, normal: FloatArray
 ) -> None:
     """Put the last pose where the arc from the one before crosses a line, by bisection."""
-    before, out = poses[-2], poses[-1]
-    low, high = 0.0, spacing
+    before = poses[-2]
+    out = poses[-1]
+    low = 0.0
+    high = spacing
     for _ in range(50):
         middle = 0.5 * (low + high)
         along_arc(before, middle, curvature, out)

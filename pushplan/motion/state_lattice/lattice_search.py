@@ -28,7 +28,8 @@ def open_search(built: BuiltLattice, builder: LatticeBuilder) -> tuple[AStar, li
     Returns:
         The search, and for start edge -2 - i the (3, 2) arcs [steps] of curve i.
     """
-    lattice, motions = built.lattice, built.motions
+    lattice = built.lattice
+    motions = built.motions
     branching = int(np.diff(motions.first).max())
     star = AStar(lattice, built.size, branching)
     row, column, heading = built.start
@@ -47,7 +48,8 @@ def open_search(built: BuiltLattice, builder: LatticeBuilder) -> tuple[AStar, li
             heading, float(motions.angles[h]), motions.config, _SLACK
         )[:_PATHS]:
             go_on(builder.stopped)
-            to_row, to_column = row + round(u), column + round(v)
+            to_row = row + round(u)
+            to_column = column + round(v)
             if not (0 <= to_row < lattice.rows and 0 <= to_column < lattice.columns):
                 continue
             box = np.array([min(u, 0), max(u, 0), min(v, 0), max(v, 0)])
@@ -69,7 +71,8 @@ def _cells_cost(built: BuiltLattice, runs: IntArray, row: int, column: int) -> f
     cell = lattice.corner + np.array([row, column]) * lattice.cells
     at = int(cell[1] * lattice.stride + cell[0])
     flat = flat_runs(runs, lattice.stride)
-    low, high = at + int(flat.min(initial=0)), at + int(flat.max(initial=0))
+    low = at + int(flat.min(initial=0))
+    high = at + int(flat.max(initial=0))
     if low < 0 or high >= len(lattice.cost_sums):
         return math.inf  # a curve that leaves the map
     if len(lattice.blocked_sums) and swath_sum(lattice.blocked_sums, flat, 0, len(flat), at) > 0.5:

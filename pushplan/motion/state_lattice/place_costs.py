@@ -54,14 +54,18 @@ def place_costs(
     window: HullWindow,
 ) -> FloatArray:
     """(U, V) cost [m] from each place of a lattice to a goal line, at least or about; 0 beyond."""
-    width, rows = sums.shape[0], sums.shape[1] - 1
+    width = sums.shape[0]
+    rows = sums.shape[1] - 1
     first, last = between
-    half, along = window.half, window.along
+    half = window.half
+    along = window.along
     ahead = window.cell * np.cos(window.lean)
     scale = window.factor * window.stage / (2 * along + 1)
     across = window.cell * np.sin(window.lean)
     costs = np.zeros((places.shape[0], columns.shape[0]))
-    values, near, line = np.zeros(width), np.empty(width), np.empty(width)
+    values = np.zeros(width)
+    near = np.empty(width)
+    line = np.empty(width)
     u = places.shape[0] - 1
     for row in range(min(goal_cell, rows) - 1, -1, -window.stage):
         # ``values``: from each column of the last row, with what is covered there
@@ -75,7 +79,8 @@ def place_costs(
                     costs[u, v] = near[column] + ahead * min(window.reach + 1, gap)
             u -= 1
         _drift(values, first, last, across)
-        low, high = max(row - along, 0), min(row + along + 1, rows)
+        low = max(row - along, 0)
+        high = min(row + along + 1, rows)
         for column in range(max(first - half, 0), min(last + half + 1, width)):
             line[column] = scale * (sums[column, high] - sums[column, low])
         total = 0.0

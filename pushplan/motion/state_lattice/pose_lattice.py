@@ -49,7 +49,8 @@ class PoseLattice(NamedTuple):
 @kernel
 def place_of(lattice: PoseLattice, node: int) -> tuple[int, int, int]:
     """Heading, row and column of a node."""
-    rest, v = node // lattice.columns, node % lattice.columns
+    rest = node // lattice.columns
+    v = node % lattice.columns
     return rest // lattice.rows, rest % lattice.rows, v
 
 
@@ -66,7 +67,8 @@ def swath_sum(sums: FloatArray, runs: IntArray, begin: int, end: int, at: int) -
 def within(planes: FloatArray, u: int, v: int, box: FloatArray) -> bool:
     """Whether a path whose origin stays in ``box`` around (u, v) keeps to all half planes."""
     for i in range(planes.shape[0]):
-        a, b = planes[i, 0], planes[i, 1]
+        a = planes[i, 0]
+        b = planes[i, 1]
         worst = a * (u + (box[1] if a > 0.0 else box[0]))
         worst += b * (v + (box[3] if b > 0.0 else box[2]))
         if worst > planes[i, 2]:
@@ -79,7 +81,8 @@ def edge_cost(lattice: PoseLattice, u: int, v: int, p: int) -> float:
     """Length plus cost of primitive ``p`` from place (u, v) [m]; infinite where it is closed."""
     at = (lattice.corner[1] + v * lattice.cells) * lattice.stride
     at += lattice.corner[0] + u * lattice.cells
-    begin, end = lattice.run_first[p], lattice.run_first[p + 1]
+    begin = lattice.run_first[p]
+    end = lattice.run_first[p + 1]
     if lattice.blocked_sums.shape[0] > 0:
         if swath_sum(lattice.blocked_sums, lattice.runs, begin, end, at) > 0.5:
             return np.inf
@@ -96,7 +99,8 @@ def successors(
     h, u, v = place_of(lattice, node)
     count = 0
     for p in range(lattice.first[h], lattice.first[h + 1]):
-        to_u, to_v = u + lattice.ends[p, 0], v + lattice.ends[p, 1]
+        to_u = u + lattice.ends[p, 0]
+        to_v = v + lattice.ends[p, 1]
         if to_u < 0 or to_u >= lattice.rows or to_v < 0 or to_v >= lattice.columns:
             continue
         if not within(lattice.planes, u, v, lattice.boxes[p]):
@@ -104,7 +108,8 @@ def successors(
         cost = edge_cost(lattice, u, v, p)
         if cost == np.inf:
             continue
-        du, dv = lattice.ends[p, 0], lattice.ends[p, 1]
+        du = lattice.ends[p, 0]
+        dv = lattice.ends[p, 1]
         straight = np.sqrt(float(du * du + dv * dv)) * lattice.step
         if (
             lattice.goal[0] == 0.0

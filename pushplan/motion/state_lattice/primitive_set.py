@@ -94,7 +94,9 @@ class PrimitiveSet(ArrayRecord):
 def _boxes(headings: FloatArray, pieces: FloatArray, lengths: FloatArray) -> FloatArray:
     """(P, 4) least and greatest x and y along arcs (P, 3, 2) from the origin."""
     boxes = np.zeros((headings.shape[0], 4))
-    poses, curvatures, start = np.empty((1000, 3)), np.empty(1000), np.zeros(3)
+    poses = np.empty((1000, 3))
+    curvatures = np.empty(1000)
+    start = np.zeros(3)
     for p in range(headings.shape[0]):
         start[2] = headings[p]
         count = sample_pieces(start, pieces[p], 0.02 * lengths[p], poses, curvatures)

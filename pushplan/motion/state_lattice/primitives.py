@@ -36,8 +36,11 @@ def fill_connections(
     out: FloatArray,  # (M, 9) receives length, x, y, and the three pieces of each path
 ) -> int:
     """Write the Dubins paths from the origin without needless turns; returns their number."""
-    start, end, pieces = np.zeros(3), np.empty(3), np.empty((3, 2))
-    start[2], end[2] = heading, target
+    start = np.zeros(3)
+    end = np.empty(3)
+    pieces = np.empty((3, 2))
+    start[2] = heading
+    end[2] = target
     change = abs(wrap_angle(target - heading))
     count = 0
     for x in range(-reach, reach + 1):
@@ -45,14 +48,17 @@ def fill_connections(
             ahead = x * np.cos(heading) + y * np.sin(heading)
             if ahead <= 0.0 or x * x + y * y > reach * reach or count == out.shape[0]:
                 continue
-            end[0], end[1] = x, y
+            end[0] = x
+            end[1] = y
             length = dubins(start, end, radius, pieces)
             turn = 0.0
             for i in range(3):
                 turn += abs(pieces[i, 0] * pieces[i, 1])
             if turn > change + slack:
                 continue
-            out[count, 0], out[count, 1], out[count, 2] = length, x, y
+            out[count, 0] = length
+            out[count, 1] = x
+            out[count, 2] = y
             for i in range(3):
                 out[count, 3 + 2 * i] = pieces[i, 0]
                 out[count, 4 + 2 * i] = pieces[i, 1]
@@ -77,7 +83,8 @@ def connections(heading: float, target: float, config: PrimitiveConfig, slack: f
 @functools.lru_cache(maxsize=2048)
 def _turning(heading: int, target: int, config: PrimitiveConfig) -> FloatArray:
     """Primitives from a heading to another one: the shortest that no straight step leads to."""
-    angles, along = lattice_angles(config.headings), directions(config.headings)[[heading, target]]
+    angles = lattice_angles(config.headings)
+    along = directions(config.headings)[[heading, target]]
     if heading == target or abs(wrap_angle(angles[target] - angles[heading])) > _MOST_TURN:
         return np.zeros((0, 9))
     kept: list[FloatArray] = []
@@ -110,7 +117,8 @@ def _shifting(heading: float, along: IntArray, config: PrimitiveConfig) -> Float
 
 def generate(config: PrimitiveConfig) -> PrimitiveSet:
     """Make a set of primitives; a quarter turn is worked out, the rest is its rotation."""
-    vectors, angles = directions(config.headings), lattice_angles(config.headings)
+    vectors = directions(config.headings)
+    angles = lattice_angles(config.headings)
     quarter = config.headings // 4
     blocks: list[tuple[IntArray, FloatArray]] = []
     for h in range(quarter):
@@ -128,7 +136,9 @@ def generate(config: PrimitiveConfig) -> PrimitiveSet:
         block = np.concatenate(rows)
         ends = np.column_stack([block[:, 1:3].round(), np.concatenate(targets)]).astype(np.int64)
         blocks.append((ends, block[:, 3:].reshape(-1, 3, 2)))
-    all_ends, all_pieces, counts = [], [], [0]
+    all_ends = []
+    all_pieces = []
+    counts = [0]
     for turn in range(4):
         for ends, pieces in blocks:
             rotated = ends.copy()

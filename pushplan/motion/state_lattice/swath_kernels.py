@@ -12,11 +12,13 @@ from pushplan.world.checks import BoolArray, FloatArray, IntArray
 @kernel
 def row_span(outline: FloatArray, row: float) -> tuple[float, float]:
     """Least and greatest column of a convex outline (N, 2) in a row; empty as (inf, -inf)."""
-    low, high = np.inf, -np.inf
+    low = np.inf
+    high = -np.inf
     count = outline.shape[0]
     for i in range(count):
         j = i + 1 if i + 1 < count else 0
-        a, b = outline[i, 0] - row, outline[j, 0] - row
+        a = outline[i, 0] - row
+        b = outline[j, 0] - row
         if (a > 0.0 and b > 0.0) or (a < 0.0 and b < 0.0):
             continue
         if a == b:
@@ -39,7 +41,8 @@ def _stamp(
     window: BoolArray,
 ) -> None:
     """Set the cells of ``window`` whose centres a footprint at ``pose`` covers."""
-    c, s = np.cos(pose[2]), np.sin(pose[2])
+    c = np.cos(pose[2])
+    s = np.sin(pose[2])
     for part in range(offsets.shape[0] - 1):
         body = vertices[offsets[part] : offsets[part + 1]]
         outline = np.empty_like(body)
@@ -96,7 +99,8 @@ def sweep_cells(
     for i in range(pieces.shape[0]):
         turn += abs(pieces[i, 0] * pieces[i, 1])
     capacity = int(length / spacing + turn / 0.1) + 4 * pieces.shape[0] + 8
-    poses, curvatures = np.empty((capacity, 3)), np.empty(capacity)
+    poses = np.empty((capacity, 3))
+    curvatures = np.empty(capacity)
     count = sample_pieces(start, pieces, spacing, poses, curvatures)
     for i in range(count):
         _stamp(poses[i], vertices, offsets, middle, True, window)

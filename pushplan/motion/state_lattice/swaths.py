@@ -51,7 +51,9 @@ class _SwathMaker:
         self, primitives: PrimitiveSet, vertices: FloatArray, offsets: IntArray, cells: int
     ) -> None:
         self._cells = cells
-        self._primitives, self._vertices, self._offsets = primitives, vertices, offsets
+        self._primitives = primitives
+        self._vertices = vertices
+        self._offsets = offsets
         self._reach = float(np.hypot(vertices[:, 0], vertices[:, 1]).max())
         self._parts: list[IntArray] = []
         self._lock = threading.Lock()
@@ -66,7 +68,8 @@ class _SwathMaker:
         return self._swaths
 
     def _one(self, p: int) -> IntArray:
-        cells, primitives = self._cells, self._primitives
+        cells = self._cells
+        primitives = self._primitives
         pieces = primitives.pieces[p] * np.array([cells, 1.0 / cells])
         heading = float(primitives.angles[primitives.heading_of(p)])
         return sweep_cells(heading, pieces, self._vertices, self._offsets, self._reach, 0.5)

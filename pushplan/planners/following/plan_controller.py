@@ -16,7 +16,8 @@ class PlanController:
     """`PathFollower` for trajectories, pure pursuit for paths without turn rates."""
 
     def __init__(self) -> None:
-        self._follower, self._pursuit = PathFollower(), PurePursuit()
+        self._follower = PathFollower()
+        self._pursuit = PurePursuit()
         self._plan: Plan | None = None
         self._chosen: Controller = self._follower
 
@@ -32,7 +33,8 @@ class PlanController:
             chosen = self._follower if is_trajectory(plan) else self._pursuit
             if chosen is not self._chosen:
                 chosen.reset(world)
-            self._plan, self._chosen = plan, chosen
+            self._plan = plan
+            self._chosen = chosen
         return self._chosen.command(world, plan)
 
 

@@ -159,7 +159,8 @@ class PlanFollower:
 
     def _act(self, world: World) -> Twist:
         wanted = self._choose(world)
-        last, held = self._clock.command, self._clock.held
+        last = self._clock.command
+        held = self._clock.held
         return ramp_twist(world.robot, last, wanted.linear, wanted.angular, held)
 
     def _choose(self, world: World) -> Twist:
@@ -218,7 +219,8 @@ class PlanFollower:
     def _ask(self, world: World, reason: Reason) -> None:
         """Call the planner; its plan is there after the time that the call takes."""
         latency = self._latency()
-        plan, now = self.current_plan, 0.0
+        plan = self.current_plan
+        now = 0.0
         if plan is not None and latency > 0.0:
             self._progress.update(plan, world.robot_pose)
             now = self._progress.time
@@ -261,7 +263,8 @@ class PlanFollower:
 
     def _keeps_old(self, world: World, new: Plan, reason: Reason) -> bool:
         """Whether the new plan is not enough better than what is left of the old one."""
-        old, margin = self.current_plan, self.replanning.margin
+        old = self.current_plan
+        margin = self.replanning.margin
         if margin is None or reason.urgent or old is None:
             return False
         if self._free_length(world, old) < math.inf:
@@ -283,7 +286,8 @@ class PlanFollower:
         return True
 
     def _needs_plan(self, world: World) -> Reason | None:
-        plan, rule = self.current_plan, self.replanning
+        plan = self.current_plan
+        rule = self.replanning
         size = world.robot.circumscribed_radius
         planned = self._planned
         waited = math.inf if planned is None else world.time - planned.time
@@ -390,7 +394,8 @@ def _check(plan: Plan, start: World) -> None:
     Raises:
         InvalidInputError: if it begins elsewhere, or predicts other objects.
     """
-    (x, y), (x0, y0) = plan.poses[0, :2].tolist(), start.robot_pose[:2].tolist()
+    (x, y) = plan.poses[0, :2].tolist()
+    (x0, y0) = start.robot_pose[:2].tolist()
     most = start.robot.circumscribed_radius
     if math.hypot(x - x0, y - y0) > most:
         raise InvalidInputError(

@@ -30,7 +30,8 @@ class RecoveryRule:
         self._recovery: Recovery | None = None
         self._place = world.robot_pose
         self._count = 0
-        self._told, self._held = 0.0, math.inf
+        self._told = 0.0
+        self._held = math.inf
 
     @property
     def idle(self) -> float:
@@ -68,7 +69,8 @@ class RecoveryRule:
         self._held = held
         size = world.robot.circumscribed_radius
         if math.dist(world.robot_pose[:2], self._place[:2]) > _PLACE * size:
-            self._place, self._count = world.robot_pose, 0
+            self._place = world.robot_pose
+            self._count = 0
         gets_on = self._checker.update(world.robot_pose, self._told)
         if self._recovery is None:
             if gets_on or self.stuck or not _can_back_off(world.robot):
@@ -92,7 +94,8 @@ class FruitlessCalls:
     """Counts the calls that found nothing since the robot is where it is."""
 
     def __init__(self) -> None:
-        self._count, self._place = 0, (math.nan, math.nan)
+        self._count = 0
+        self._place = (math.nan, math.nan)
 
     def add(self, world: World) -> None:
         """Another call from here has found nothing."""

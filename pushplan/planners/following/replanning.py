@@ -144,7 +144,8 @@ def free_length(world: World, path: FloatArray) -> float:
         path: (N, 3) poses, from that of the robot on.
     """
     size = world.robot.circumscribed_radius
-    lengths, turns = arc_lengths(path), np.abs(np.diff(np.unwrap(path[:, 2])))
+    lengths = arc_lengths(path)
+    turns = np.abs(np.diff(np.unwrap(path[:, 2])))
     along = lengths + size * np.concatenate([[0.0], np.cumsum(turns)])
     fine = np.linspace(0.0, along[-1], 1 + math.ceil(along[-1] / (_SPACING * size)))
     poses = poses_at(fine, along, path)

@@ -105,14 +105,16 @@ def _stretch(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Times from now (N,), poses (N, 3) and twists (N, 2) over the next ``latency`` seconds."""
     if plan is None:
-        times, poses = np.zeros(1), np.array(world.robot_pose)[None]
+        times = np.zeros(1)
+        poses = np.array(world.robot_pose)[None]
         twists = np.array([[world.robot.min_speed, 0.0]])
     else:
         times, poses, twists = _on_plan(plan, now, latency)
     left = latency - float(times[-1])
     if left <= 1e-9:
         return times, poses, twists
-    robot, last = world.robot, poses[-1]
+    robot = world.robot
+    last = poses[-1]
     waits = waiting_twist(world.moved(robot_pose=last))
     speed = abs(waits.linear)
     steps = math.ceil(left * speed / (_SPACING * robot.circumscribed_radius)) or 1

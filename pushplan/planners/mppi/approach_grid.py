@@ -18,7 +18,9 @@ from pushplan.world.outline import inscribed_radius
 _CELL = 0.35  # side of a cell [R]
 _MOST_CELLS = 6000
 _NEAR = 2.0  # distance to the place within which the way counts as straight [R]
-_TARGET, _OTHERS = 6.0, 2.0  # what a metre costs more within an object [metres]
+# what a metre costs more within an object [metres]
+_TARGET = 6.0
+_OTHERS = 2.0
 _TURNS = np.radians([0.0, 25.0, -25.0, 50.0, -50.0, 75.0, -75.0])
 """Directions of a push that are tried in turn where the robot does not fit behind the object."""
 
@@ -58,7 +60,9 @@ def place_behind(world: World, k: int, heading: float, skipped: int = 0) -> Floa
         skipped: places that have failed already; after the last one the first comes again.
     """
     grid, clearances = _grid(world)
-    away, x, y = standoff(world, k), world.movables.poses[k, 0], world.movables.poses[k, 1]
+    away = standoff(world, k)
+    x = world.movables.poses[k, 0]
+    y = world.movables.poses[k, 1]
     needed = world.robot.inscribed_radius
     rows, cols = grid.shape
     places = []
@@ -83,7 +87,8 @@ def approach_to(world: World, config: MppiConfig, k: int, place: FloatArray) -> 
         place: (3,) from `place_behind`.
     """
     grid, clearances = _grid(world)
-    size, needed = world.robot.circumscribed_radius, world.robot.inscribed_radius
+    size = world.robot.circumscribed_radius
+    needed = world.robot.inscribed_radius
     x, y = np.meshgrid(grid.x, grid.y)
     weights = np.ones(grid.shape)
     for i, pose in enumerate(world.movables.poses):
@@ -93,7 +98,8 @@ def approach_to(world: World, config: MppiConfig, k: int, place: FloatArray) -> 
     weights[clearances < needed] = np.inf
     rows, cols = grid.shape
     row, col = grid.cell(float(place[0]), float(place[1]))
-    row, col = min(max(row, 0), rows - 1), min(max(col, 0), cols - 1)
+    row = min(max(row, 0), rows - 1)
+    col = min(max(col, 0), cols - 1)
     values, _, _ = grid_dijkstra(
         weights,
         np.array([row * cols + col]),

@@ -10,7 +10,8 @@ from pushplan.planners.mppi.mppi_config import MppiConfig
 from pushplan.world import Drive, RobotModel
 from pushplan.world.checks import FloatArray
 
-SPEED, TURN = 0, 1
+SPEED = 0
+TURN = 1
 """Columns of controls: speed and turn rate, as fractions of the greatest ones."""
 
 
@@ -43,7 +44,8 @@ def interpolation(steps: int, knots: int) -> FloatArray:
     """(H, M) matrix that gives the controls in the middle of each step from those at the knots."""
     places = (np.arange(steps) + 0.5) / steps * (knots - 1)
     left = np.minimum(places.astype(np.int64), knots - 2)
-    rows, share = np.arange(steps), places - left
+    rows = np.arange(steps)
+    share = places - left
     matrix = np.zeros((steps, knots))
     matrix[rows, left] = 1.0 - share
     matrix[rows, left + 1] = share

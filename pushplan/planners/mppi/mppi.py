@@ -77,19 +77,24 @@ class Mppi:
             stop: looked at after each iteration; `MppiConfig.iterations` of them if None.
             rng: the only source of randomness.
         """
-        call, config = PlanningCall(world, stop, rng), self.config
+        call = PlanningCall(world, stop, rng)
+        config = self.config
         model = RolloutModel(world, config, self.interaction)
         if nominal is None:
             nominal = resting(world.robot, config, world.time, model.horizon)
         mean = nominal.later(world.time).knots
-        spread, low = first_spread(world.robot, config), least_controls(world.robot)
-        best, least, done = mean, np.inf, 0
+        spread = first_spread(world.robot, config)
+        low = least_controls(world.robot)
+        best = mean
+        least = np.inf
+        done = 0
         for done in range(1, config.iterations + 1):
             samples = draw(call.rng, mean, spread, low, config)
             costs = objective(model.roll(samples))
             k = int(np.argmin(costs))
             if costs[k] < least:
-                best, least = samples[k], float(costs[k])
+                best = samples[k]
+                least = float(costs[k])
             mean, spread = updated(config, samples, costs, spread)
             if call.check(done, least):
                 break
@@ -108,7 +113,8 @@ class Mppi:
 
 def _plan(world: World, model: RolloutModel, rollouts: Rollouts, s: int) -> Plan:
     """The plan of one rollout."""
-    end, parts = int(rollouts.ends[s]), model.problem.substeps
+    end = int(rollouts.ends[s])
+    parts = model.problem.substeps
     poses: FloatArray = rollouts.paths[s, : end + 1]
     twists = np.repeat(rollouts.twists[s], parts, axis=0)
     twists = np.concatenate([twists, twists[-1:]])[: end + 1]

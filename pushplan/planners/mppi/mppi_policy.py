@@ -104,7 +104,8 @@ class MppiPolicy:
         return self._clock.command_for(world, self._act)
 
     def _act(self, world: World) -> Twist:
-        last, held = self._clock.command, self._clock.held
+        last = self._clock.command
+        held = self._clock.held
         wanted = self._wanted(world, held)
         return ramp_twist(world.robot, last, wanted.linear, wanted.angular, held)
 
@@ -125,7 +126,10 @@ class MppiPolicy:
 
     def _ask(self, world: World) -> None:
         """Have a decision made."""
-        planner, rng, nominal, targets = self.planner, self._rng, self._controls, self._targets
+        planner = self.planner
+        rng = self._rng
+        nominal = self._controls
+        targets = self._targets
 
         def decide(stop: Stop | None) -> Decision:
             objective = _objective(world, planner.config, targets)
@@ -138,7 +142,8 @@ class MppiPolicy:
         """Take up a decision that is there."""
         if self._pending is None or not self._pending.ready(world.time):
             return
-        pending, self._pending = self._pending, None
+        pending = self._pending
+        self._pending = None
         decision = pending.result()
         self._controls = decision.controls
         self.plan_log.append(decision.result)

@@ -48,7 +48,8 @@ def _cell(world: World, size: float) -> float:
 
 def _weights(world: World, config: MppiConfig, defaults: _Defaults) -> CostWeights:
     robot = world.robot
-    goal_weight, collision = config.goal_weight, config.collision_cost
+    goal_weight = config.goal_weight
+    collision = config.collision_cost
     if goal_weight is None:
         goal_weight = defaults.goal_weight
     if collision is None:
@@ -59,7 +60,8 @@ def _weights(world: World, config: MppiConfig, defaults: _Defaults) -> CostWeigh
 
 def navigation_objective(world: World, config: MppiConfig) -> Objective:
     """Driving and pushing up to the horizon, and the way that is left to the goal."""
-    robot, weights = world.robot, _weights(world, config, _NAVIGATION)
+    robot = world.robot
+    weights = _weights(world, config, _NAVIGATION)
     cell = _cell(world, robot.circumscribed_radius)
     field = robot_field(world.static, world.navigation_goal, robot.inscribed_radius, cell)
 
@@ -78,7 +80,9 @@ def object_costs(world: World, config: MppiConfig) -> ObjectCosts:
     as driving half across the map on top: without that a robot that has just finished one would
     be worse off, as the next one is far away.
     """
-    movables, robot, static = world.movables, world.robot, world.static
+    movables = world.movables
+    robot = world.robot
+    static = world.static
     sides = static.bounds[2:] - static.bounds[:2]
     undone = 0.5 * robot.mass * float(np.hypot(*sides))
     radius = float(movables.radii.max()) if len(movables) else robot.circumscribed_radius

@@ -60,10 +60,12 @@ def sample(field: Field, x: float, y: float) -> float:
 @kernel
 def driving_cost(s: int, rollouts: Rollouts, weights: CostWeights) -> float:
     """m₀ l₀ + w Σ mᵢ lᵢ of a rollout [kg m], and what is added where it is blocked."""
-    path, end = rollouts.paths[s], rollouts.ends[s]
+    path = rollouts.paths[s]
+    end = rollouts.ends[s]
     length = 0.0
     for n in range(end):
-        dx, dy = path[n + 1, 0] - path[n, 0], path[n + 1, 1] - path[n, 1]
+        dx = path[n + 1, 0] - path[n, 0]
+        dy = path[n + 1, 1] - path[n, 1]
         length += np.sqrt(dx * dx + dy * dy)
     cost = weights.robot_mass * length + weights.push_weight * rollouts.works[s]
     if rollouts.outcomes[s] == BLOCKED:
@@ -86,8 +88,10 @@ def navigation_costs(
 @kernel
 def _way_behind(robot: FloatArray, dx: float, dy: float, approach: Approach) -> float:
     """Way of the robot to behind the target [m], which has moved by (dx, dy)."""
-    x, y = robot[0] - dx, robot[1] - dy
-    way, place = sample(approach.field, x, y), approach.place
+    x = robot[0] - dx
+    y = robot[1] - dy
+    way = sample(approach.field, x, y)
+    place = approach.place
     if way < approach.near:
         way = np.sqrt((x - place[0]) ** 2 + (y - place[1]) ** 2)
         facing = 1.0 - np.cos(robot[2] - place[2])
@@ -106,8 +110,10 @@ def manipulation_costs(
 ) -> None:
     """Costs (S,) of rollouts of a robot that has to bring objects to their goal [kg m]."""
     for s in range(out.shape[0]):
-        left, waiting = 0.0, False
-        objects, target = rollouts.objects[s], approach.target
+        left = 0.0
+        waiting = False
+        objects = rollouts.objects[s]
+        target = approach.target
         for k in range(start.shape[0]):
             if costs.weights[k] == 0.0:
                 continue
@@ -116,7 +122,8 @@ def manipulation_costs(
                 left += costs.undone + costs.weights[k] * (way - costs.done[k])
                 waiting = waiting or k == target
         if waiting:
-            dx, dy = objects[target, 0] - start[target, 0], objects[target, 1] - start[target, 1]
+            dx = objects[target, 0] - start[target, 0]
+            dy = objects[target, 1] - start[target, 1]
             robot = rollouts.paths[s, rollouts.ends[s]]
             left += approach.weight * _way_behind(robot, dx, dy, approach)
         out[s] = driving_cost(s, rollouts, weights) + weights.goal_weight * left

@@ -13,7 +13,9 @@ from pushplan.motion.collision import ConvexObstacles, Footprint, is_free, stati
 from pushplan.motion.goal_region import in_goal
 from pushplan.world.checks import FloatArray, IntArray
 
-DRIVEN, REACHED, BLOCKED = 0, 1, 2
+DRIVEN = 0
+REACHED = 1
+BLOCKED = 2
 """How a rollout ends: at the horizon, in the goal, or at something static or jammed."""
 
 
@@ -91,8 +93,10 @@ def roll_robot(
     out: Rollouts,
 ) -> None:
     """Drive the robot by one control sequence until it is blocked or in the goal."""
-    limits, path = problem.limits, out.paths[s]
-    speed, rate = twist[0], twist[1]
+    limits = problem.limits
+    path = out.paths[s]
+    speed = twist[0]
+    rate = twist[1]
     part = problem.period / problem.substeps
     copy_into(path[0], start)
     out.outcomes[s] = DRIVEN
@@ -105,7 +109,8 @@ def roll_robot(
         if limits.turning_radius > 0.0:
             most = min(most, abs(speed) / limits.turning_radius)
         rate = min(max(rate, -most), most)
-        out.twists[s, h, 0], out.twists[s, h, 1] = speed, rate
+        out.twists[s, h, 0] = speed
+        out.twists[s, h, 1] = rate
         if out.outcomes[s] != DRIVEN:
             continue
         for _ in range(problem.substeps):
@@ -143,13 +148,15 @@ def roll_objects(
     """Carry the objects along each path, which ends where the robot jams."""
     moved = np.empty(start.shape[0])
     for s in range(out.paths.shape[0]):
-        path, objects = out.paths[s], out.objects[s]
+        path = out.paths[s]
+        objects = out.objects[s]
         for k in range(start.shape[0]):
             copy_into(objects[k], start[k])
             moved[k] = 0.0
         for n in range(out.ends[s]):
             if not advance_objects(model, path[n], path[n + 1], objects, moved):
-                out.ends[s], out.outcomes[s] = n, BLOCKED
+                out.ends[s] = n
+                out.outcomes[s] = BLOCKED
                 break
         out.works[s] = 0.0
         for k in range(start.shape[0]):

@@ -65,7 +65,8 @@ class RolloutModel:
     def __init__(
         self, world: World, config: MppiConfig, interaction: InteractionModel | None = None
     ) -> None:
-        self.config, self.period = config, step_length(world, config)
+        self.config = config
+        self.period = step_length(world, config)
         self.world = _nearby(world, config.steps * self.period)
         self.interaction = default_model(world) if interaction is None else interaction
         self.compiled = (
@@ -115,9 +116,11 @@ class RolloutModel:
         else:
             swept = [model.sweep(self.world, path) for path in paths]
         for s, one in enumerate(swept):
-            rollouts.objects[s], rollouts.works[s] = one.object_poses[-1], one.work
+            rollouts.objects[s] = one.object_poses[-1]
+            rollouts.works[s] = one.work
             if one.jammed_at >= 0:
-                rollouts.ends[s], rollouts.outcomes[s] = max(one.jammed_at - 1, 0), BLOCKED
+                rollouts.ends[s] = max(one.jammed_at - 1, 0)
+                rollouts.outcomes[s] = BLOCKED
 
 
 def _nearby(world: World, horizon: float) -> World:
@@ -125,7 +128,8 @@ def _nearby(world: World, horizon: float) -> World:
 
     Where objects have a goal all of them stay: the costs are of all.
     """
-    movables, robot = world.movables, world.robot
+    movables = world.movables
+    robot = world.robot
     if len(movables) <= _FEW or not isinstance(world.goal, GoalDisc | GoalLine):
         return world
     reach = horizon * robot.max_speed + (1.0 + _NEAR) * robot.circumscribed_radius
@@ -153,7 +157,8 @@ def _problem(world: World, config: MppiConfig, period: float) -> RolloutProblem:
         robot.max_turn_acceleration * period,
         robot.min_turning_radius,
     )
-    walls, start = obstacles(keep_out(world)), owned(world.robot_pose)
+    walls = obstacles(keep_out(world))
+    start = owned(world.robot_pose)
     turn = robot.max_turn_rate * period
     length = max(robot.max_speed, -robot.min_speed) * period / robot.circumscribed_radius
     for margin in (config.margin * robot.circumscribed_radius, 0.0):

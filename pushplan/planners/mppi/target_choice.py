@@ -31,11 +31,13 @@ class TargetChoice:
         self.config = config
         self._target = -1
         self._failures: dict[int, int] = {}
-        self._best, self._since = math.inf, 0.0
+        self._best = math.inf
+        self._since = 0.0
 
     def approach(self, world: World) -> Approach:
         """The way to behind the object that is to be pushed now."""
-        movables, completed = world.movables, world.completed
+        movables = world.movables
+        completed = world.completed
         ids = movables.ids.tolist()
         left = [k for k in range(len(ids)) if not completed[k]]
         if not left:
@@ -52,12 +54,15 @@ class TargetChoice:
         k = min(
             found, key=lambda k: (self._failures.get(ids[k], 0), _way(world, k, found[k]), ids[k])
         )
-        self._target, self._best, self._since = ids[k], math.inf, world.time
+        self._target = ids[k]
+        self._best = math.inf
+        self._since = world.time
         return approach_to(world, self.config, k, found[k])
 
     def _behind(self, world: World, k: int) -> FloatArray | None:
         """(3,) pose behind an object on its way to the goal; None if there is no way."""
-        movables, robot = world.movables, world.robot
+        movables = world.movables
+        robot = world.robot
         points = _way_of_object(world, k).points
         steps = np.hypot(*(points - points[:1]).T) if len(points) else np.zeros(0)
         ahead = np.flatnonzero(steps > 0.02 * robot.circumscribed_radius)
@@ -73,7 +78,8 @@ class TargetChoice:
         size = robot.circumscribed_radius
         now = _way(world, k, place) + _PUSHED * _way_of_object(world, k).length
         if now < self._best - _GAIN * size:
-            self._best, self._since = now, world.time
+            self._best = now
+            self._since = world.time
         return world.time - self._since < self.config.patience * size / robot.max_speed
 
 

@@ -76,7 +76,8 @@ class Namo:
             InvalidInputError: if the world's goal is not one for the robot.
         """
         call = PlanningCall(world, stop, rng, DefaultBudget(self.config.default_pushes))
-        world, goal = call.world, call.world.navigation_goal
+        world = call.world
+        goal = call.world.navigation_goal
         there = goal.distance(*world.robot_pose[:2].tolist()) == 0.0
         if there or not suits_keyholes(world, self.config):
             return self.navigator.plan(world, stop=stop, rng=call.rng)
@@ -137,7 +138,8 @@ class _Rest(Stop):
     """What is left of the stop rule of a call after some iterations."""
 
     def __init__(self, call: PlanningCall, iterations: int) -> None:
-        self._call, self._iterations = call, iterations
+        self._call = call
+        self._iterations = iterations
 
     def start(self) -> StopCheck:
         """Go on with the rule of the call."""

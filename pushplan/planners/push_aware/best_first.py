@@ -69,7 +69,8 @@ def _signature(objects: FloatArray, start: FloatArray, radii: FloatArray, count:
         return 0
     code = np.int64(0)
     for k in range(objects.shape[0]):
-        dx, dy = objects[k, 0] - start[k, 0], objects[k, 1] - start[k, 1]
+        dx = objects[k, 0] - start[k, 0]
+        dy = objects[k, 1] - start[k, 1]
         if dx * dx + dy * dy > (0.1 * radii[k]) ** 2:
             code = code * 31 + k + 1
     return int(code % count)
@@ -97,7 +98,9 @@ def _best_there(tree: PushTree, node: int, table: CostToGo, radii: FloatArray) -
 @kernel
 def _settle(lattice: PushLattice, node: int, length: float) -> bool:
     """Write down what a node really costs; False if its cell has a cheaper one."""
-    tree, problem, memory = lattice.tree, lattice.problem, lattice.memory
+    tree = lattice.tree
+    problem = lattice.problem
+    memory = lattice.memory
     parent = tree.parents[node]
     work = 0.0
     for i in range(memory.moved.shape[0]):
@@ -147,13 +150,18 @@ def _successors(
     lattice: PushLattice, number: int, numbers: IntArray, costs: FloatArray, edges: IntArray
 ) -> int:
     """Drive an arc; or list those that leave a node, as if they pushed nothing."""
-    tree, table, branching = lattice.tree, lattice.table, lattice.branching
-    m0, goal, length = lattice.problem.robot_mass, lattice.problem.goal, branching.length
+    tree = lattice.tree
+    table = lattice.table
+    branching = lattice.branching
+    m0 = lattice.problem.robot_mass
+    goal = lattice.problem.goal
+    length = branching.length
     node = number >> 1
     if number % 2 == 0:
         if not _drive_to(lattice, node):
             return 0
-        numbers[0], edges[0] = number + 1, 0
+        numbers[0] = number + 1
+        edges[0] = 0
         costs[0] = tree.costs[node] - tree.costs[tree.parents[node]]
         return 1
     if tree.counts[0] + branching.curvatures.shape[0] > tree.poses.shape[0]:
@@ -184,9 +192,12 @@ def _successors(
         tree.costs[new] = cost
         tree.estimates[new] = max(cost + branching.inflation * m0 * left, tree.estimates[node])
         tree.parents[new] = node
-        tree.arcs[new, 0], tree.arcs[new, 1] = length, curvature
+        tree.arcs[new, 0] = length
+        tree.arcs[new, 1] = curvature
         tree.rows[new] = -1
-        numbers[found], costs[found], edges[found] = 2 * new, 0.0, 0
+        numbers[found] = 2 * new
+        costs[found] = 0.0
+        edges[found] = 0
         found += 1
     return found
 
@@ -194,7 +205,8 @@ def _successors(
 @kernel
 def _estimate(lattice: PushLattice, number: int) -> float:
     """What is left to pay; the arc of a guess is paid when it is driven."""
-    tree, node = lattice.tree, number >> 1
+    tree = lattice.tree
+    node = number >> 1
     paid = tree.costs[node] if number % 2 == 1 else tree.costs[tree.parents[node]]
     left: float = tree.estimates[node] - paid
     return left

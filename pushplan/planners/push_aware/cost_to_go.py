@@ -44,9 +44,11 @@ def mark_free(
     """Mark which of the cells from ``first`` to ``last`` (exclusive) hold the footprint."""
     scratch = np.empty_like(shape.vertices)
     pose = np.empty(3)
-    cols, headings = free.shape[1], free.shape[2]
+    cols = free.shape[1]
+    headings = free.shape[2]
     for at in range(first, last):
-        r, c = at // cols, at % cols
+        r = at // cols
+        c = at % cols
         pose[0] = table.origin[0] + (c + 0.5) * table.cell
         pose[1] = table.origin[1] + (r + 0.5) * table.cell
         for k in range(headings):
@@ -62,15 +64,19 @@ def flood(
     center: IntArray,  # (2,) row and column of the goal's middle, negative for none
 ) -> tuple[FloatArray, IntArray]:
     """Grid lengths (rows, columns) [m] to the goal, and the cells in the order of their lengths."""
-    origin, cell = table.origin, table.cell
+    origin = table.origin
+    cell = table.cell
     rows, cols = open_cells.shape
-    starts, count = np.empty(rows * cols + 1, np.int64), 0
+    starts = np.empty(rows * cols + 1, np.int64)
+    count = 0
     weights = np.full((rows, cols), np.inf)
     for at in range(rows * cols):
-        r, c = at // cols, at % cols
+        r = at // cols
+        c = at % cols
         if open_cells[r, c]:
             weights[r, c] = 1.0
-        x, y = origin[0] + (c + 0.5) * cell, origin[1] + (r + 0.5) * cell
+        x = origin[0] + (c + 0.5) * cell
+        y = origin[1] + (r + 0.5) * cell
         # a disc may be smaller than a cell
         if (open_cells[r, c] and in_goal(x, y, goal)) or (r == center[0] and c == center[1]):
             starts[count] = at
@@ -87,12 +93,18 @@ def _between(
 ) -> float:
     """Interpolated value at a pose; cells without a value do not count, inf if none has one."""
     rows, cols, headings = values.shape
-    u, v = (x - ox) / cell - 0.5, (y - oy) / cell - 0.5
+    u = (x - ox) / cell - 0.5
+    v = (y - oy) / cell - 0.5
     t = (theta / (2.0 * np.pi) * headings) % headings
-    j, i, k = int(np.floor(u)), int(np.floor(v)), int(t)
-    fu, fv, ft = u - j, v - i, t - k
+    j = int(np.floor(u))
+    i = int(np.floor(v))
+    k = int(t)
+    fu = u - j
+    fv = v - i
+    ft = t - k
     k = k % headings
-    total, weight = 0.0, 0.0
+    total = 0.0
+    weight = 0.0
     for di in range(2):
         r = i + di
         if r < 0 or r >= rows:
@@ -121,13 +133,18 @@ def sweep(
     length: float,  # of the arcs [m]
 ) -> float:
     """One Gauss-Seidel sweep over the cells; returns the greatest change [m]."""
-    values, cell = table.values, table.cell
-    cols, headings = values.shape[1], values.shape[2]
+    values = table.values
+    cell = table.cell
+    cols = values.shape[1]
+    headings = values.shape[2]
     change = 0.0
-    ox, oy = table.origin[0], table.origin[1]
+    ox = table.origin[0]
+    oy = table.origin[1]
     for n in range(order.shape[0]):
-        r, c = order[n] // cols, order[n] % cols
-        x, y = ox + (c + 0.5) * cell, oy + (r + 0.5) * cell
+        r = order[n] // cols
+        c = order[n] % cols
+        x = ox + (c + 0.5) * cell
+        y = oy + (r + 0.5) * cell
         if table.floor[r, c] == 0.0:
             continue
         for k in range(headings):
@@ -135,7 +152,9 @@ def sweep(
                 continue
             best = values[r, c, k]
             for a in range(ends.shape[1]):
-                nx, ny, nt = x + ends[k, a, 0], y + ends[k, a, 1], ends[k, a, 2]
+                nx = x + ends[k, a, 0]
+                ny = y + ends[k, a, 1]
+                nt = ends[k, a, 2]
                 value = length + _between(values, ox, oy, cell, nx, ny, nt)
                 if value < best:
                     best = value

@@ -41,7 +41,8 @@ class CostToGoMaker:
     ) -> None:
         size = robot.circumscribed_radius
         self._goal = goal_numbers(goal, inset)
-        self._shape, self._walls = footprint(robot), obstacles(static)
+        self._shape = footprint(robot)
+        self._walls = obstacles(static)
         extent = static.bounds[2:] - static.bounds[:2]
         least = float(np.sqrt(extent[0] * extent[1] / _MOST_CELLS))
         cell = max(_CELL * size, least, float(extent.max()) / _MOST_CELLS)
@@ -56,7 +57,8 @@ class CostToGoMaker:
                 self._center = np.array([int(at[1]), int(at[0])])
         self._free = np.zeros((rows, cols, HEADINGS), np.bool_)
         self._order = np.zeros(0, np.int64)
-        values, far = np.full((rows, cols, HEADINGS), np.inf), np.full((rows, cols), np.inf)
+        values = np.full((rows, cols, HEADINGS), np.inf)
+        far = np.full((rows, cols), np.inf)
         self._table = CostToGo(values, far, static.bounds[:2].copy(), cell)
         self._ends = np.zeros((HEADINGS, 3, 3))
         for k in range(HEADINGS):
@@ -94,11 +96,13 @@ class CostToGoMaker:
         last = min(self._at + _BLOCK, len(self._order))
         order = self._order[self._at : last]
         change = sweep(self._table, self._free, order, self._ends, self._length)
-        self._change, self._at = max(self._change, change), last
+        self._change = max(self._change, change)
+        self._at = last
         if last == len(self._order):
             self._sweeps += 1
             self._done = self._change < self._settled or self._sweeps >= _MOST_SWEEPS
-            self._at, self._change = 0, 0.0
+            self._at = 0
+            self._change = 0.0
 
 
 @functools.lru_cache(maxsize=8)

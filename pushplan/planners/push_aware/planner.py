@@ -85,7 +85,8 @@ class PushAware:
             "random_arcs": float(search.random_arcs),
         }
         if status.has_plan:
-            detail["cost"], detail["bound"] = float(improver.best_cost), search.bound
+            detail["cost"] = float(improver.best_cost)
+            detail["bound"] = search.bound
             detail["gap"] = _gap(float(improver.best_cost), search.bound)
         return improver.result(status, **detail)
 

@@ -54,8 +54,12 @@ class PushAwareSearch:
         improver: PathImprover,  # keeps the best path
         config: PushAwareConfig,
     ) -> None:
-        self.improver, self.config, self.trees = improver, config, TreePaths(improver)
-        self.world, self.rng, self.size = improver.world, improver.rng, improver.size
+        self.improver = improver
+        self.config = config
+        self.trees = TreePaths(improver)
+        self.world = improver.world
+        self.rng = improver.rng
+        self.size = improver.size
         self.expansions = self.searches = self.random_arcs = 0
         self.bound = 0.0
         """What no plan can cost less than [kg m]."""
@@ -91,7 +95,8 @@ class PushAwareSearch:
             A status where the call ends here: the start is blocked, the robot is there already,
             or no way leads to the goal or on at all.
         """
-        improver, trees = self.improver, self.trees
+        improver = self.improver
+        trees = self.trees
         status = improver.begin()
         if status is not None:
             return status
@@ -137,7 +142,8 @@ class PushAwareSearch:
 
     def _table(self) -> CostToGo | None:
         """Lengths to the goal without objects; the same for every call on this map."""
-        robot, static = self.world.robot, keep_out(self.world)
+        robot = self.world.robot
+        static = keep_out(self.world)
         inset = self.config.inset * self.size
         maker = cost_to_go_maker(robot, static, self.improver.goal, self._radius, inset)
         return maker.make(self.improver.stopped)
@@ -150,7 +156,8 @@ class PushAwareSearch:
 
     def _random_variant(self, table: CostToGo) -> _SearchVariant:
         """Other edges, another inflation and other costs: what one search misses another finds."""
-        config, rng = self.config, self.rng
+        config = self.config
+        rng = self.rng
         masses = self.world.movables.masses
         most = max(1.03 * config.heuristic_inflation, self._cost_ratio(table))
         return _SearchVariant(
@@ -217,7 +224,9 @@ class PushAwareSearch:
 
     def _grow_at_random(self, arcs: float) -> None:
         """Add arcs to the random tree, and shortcut what gets to the goal with it."""
-        improver, world, few = self.improver, self.world, self._few()
+        improver = self.improver
+        world = self.world
+        few = self._few()
         if self._tree is None:
             config = self.config
             count = min(config.nodes, _RANDOM_NODES)

@@ -70,7 +70,8 @@ def drive(tree: PushTree, node: int, problem: PathProblem, memory: ArcMemory) ->
     """Drive the arc to a node; returns the length driven [m], as `roll_arc` does."""
     parent = tree.parents[node]
     objects = tree.objects[tree.rows[parent]]
-    longest, curvature = float(tree.arcs[node, 0]), float(tree.arcs[node, 1])
+    longest = float(tree.arcs[node, 0])
+    curvature = float(tree.arcs[node, 1])
     length: float = roll_arc(problem, tree.poses[parent], objects, longest, curvature, memory)
     if length > 0.0 and in_goal(memory.end[0], memory.end[1], problem.goal):
         copy_into(tree.poses[node], memory.end)  # it may come in before the end of the arc

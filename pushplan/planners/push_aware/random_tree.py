@@ -33,7 +33,8 @@ def nearest(
     bound: float,  # [kg m]
 ) -> int:
     """The node nearest to a target among those that cost less than a bound."""
-    best, least = 0, np.inf
+    best = 0
+    least = np.inf
     for i in range(tree.counts[0]):
         if tree.costs[i] >= bound:
             continue
@@ -42,7 +43,8 @@ def nearest(
         gap = gap / scales[0] ** 2 + (turn / scales[1]) ** 2
         gap += ((tree.costs[i] - target[3]) / scales[2]) ** 2
         if gap < least:
-            best, least = i, gap
+            best = i
+            least = gap
     return best
 
 
@@ -58,7 +60,8 @@ def grow(
     """Add a random arc for each row of ``draws``; a node in the goal, -1: none, -2: memory full."""
     memory = make_arc_memory(problem)
     target = np.empty(4)
-    low, high = problem.walls.bounds[:2], problem.walls.bounds[2:]
+    low = problem.walls.bounds[:2]
+    high = problem.walls.bounds[2:]
     for i in range(draws.shape[0]):
         new = int(tree.counts[0])
         if new == tree.poses.shape[0] or tree.counts[1] == tree.objects.shape[0]:
@@ -66,21 +69,22 @@ def grow(
         draw = draws[i]
         for axis in range(2):
             target[axis] = low[axis] + draw[axis] * (high[axis] - low[axis])
-        target[2], target[3] = 2.0 * np.pi * draw[2], bound * draw[3]
+        target[2] = 2.0 * np.pi * draw[2]
+        target[3] = bound * draw[3]
         near = nearest(tree, target, scales, bound)
-        curvature, length = (
-            (2.0 * draw[4] - 1.0) / problem.turning_radius,
-            longest * (1.0 - draw[5]),
-        )
+        curvature = (2.0 * draw[4] - 1.0) / problem.turning_radius
+        length = longest * (1.0 - draw[5])
         tree.parents[new] = near
-        tree.arcs[new, 0], tree.arcs[new, 1] = length, curvature
+        tree.arcs[new, 0] = length
+        tree.arcs[new, 1] = curvature
         along_arc(tree.poses[near], length, curvature, tree.poses[new])
         length = drive(tree, new, problem, memory)
         if length == 0.0:
             continue
         work = work_of(memory.moved, problem.contacts.inverse_masses)
         cost = tree.costs[near] + problem.robot_mass * length + problem.push_weight * work
-        x, y = tree.poses[new, 0], tree.poses[new, 1]
+        x = tree.poses[new, 0]
+        y = tree.poses[new, 1]
         left = distance_to_goal(x, y, problem.goal)
         if not cost + problem.robot_mass * left < bound:
             continue

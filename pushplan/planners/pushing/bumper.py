@@ -95,7 +95,8 @@ def face_towards(outline: FloatArray, direction: float) -> Face:
         outline: (N, 2) convex, counter-clockwise corners, origin at the centroid [m].
         direction: [rad].
     """
-    outline, direction = convex_outline("outline", outline), number("direction", direction)
+    outline = convex_outline("outline", outline)
+    direction = number("direction", direction)
     faces, scores = faces_of(outline)
     facing = scores @ np.array([math.cos(direction), math.sin(direction), 1.0])
     return faces[int(np.argmax(facing))]
@@ -132,7 +133,8 @@ def _foremost(part: FloatArray, ys: FloatArray) -> FloatArray:
     """Greatest x of a convex part at each y, -inf beside it."""
     found = np.full(len(ys), -np.inf)
     for (ax, ay), (bx, by) in zip(part, np.roll(part, -1, axis=0), strict=True):
-        low, high = min(ay, by), max(ay, by)
+        low = min(ay, by)
+        high = max(ay, by)
         if high - low < 1e-12:
             continue
         at = (ys >= low) & (ys <= high)

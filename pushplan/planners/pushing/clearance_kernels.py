@@ -73,16 +73,26 @@ def gaps(
     obstacles: Obstacles,
 ) -> tuple[float, float]:
     """Least distance of the robot and of the box from static things [m], negative inside one."""
-    box, placed = problem.box, problem.placed
-    robot_gap, box_gap = np.inf, np.inf
+    box = problem.box
+    placed = problem.placed
+    robot_gap = np.inf
+    box_gap = np.inf
     box_pose(contact, state, box)
     parts = problem.offsets.shape[0] - 1
     for p in range(parts):
-        x, y, theta, least = state[0], state[1], state[2], robot_gap
+        x = state[0]
+        y = state[1]
+        theta = state[2]
+        least = robot_gap
         if p == parts - 1:
-            x, y, theta, least = box[0], box[1], box[2] - normal, box_gap
-        first, last = problem.offsets[p], problem.offsets[p + 1]
-        c, s = np.cos(theta), np.sin(theta)
+            x = box[0]
+            y = box[1]
+            theta = box[2] - normal
+            least = box_gap
+        first = problem.offsets[p]
+        last = problem.offsets[p + 1]
+        c = np.cos(theta)
+        s = np.sin(theta)
         for i in range(first, last):
             placed[i, 0] = x + c * problem.vertices[i, 0] - s * problem.vertices[i, 1]
             placed[i, 1] = y + s * problem.vertices[i, 0] + c * problem.vertices[i, 1]
@@ -133,7 +143,9 @@ def free_fraction(
     obstacles: Obstacles,
 ) -> float:
     """Fraction of a command that keeps robot and box clear of static things."""
-    here, before, detail = problem.states[0], problem.states[1], problem.detail
+    here = problem.states[0]
+    before = problem.states[1]
+    detail = problem.detail
     copy_into(here, start)
     now = gaps(contact, normal, here, problem, obstacles)
     robot = min(problem.least, now[0] - problem.slack)
@@ -146,7 +158,8 @@ def free_fraction(
             contact, normal, here, problem, obstacles, robot, box, travel_ahead * (i + 1) / SAMPLES
         ):
             continue
-        free, step = i / SAMPLES, 0.5 / SAMPLES
+        free = i / SAMPLES
+        step = 0.5 / SAMPLES
         for _ in range(HALVINGS):
             copy_into(here, before)
             advance(contact, here, v, w, step * duration, detail)

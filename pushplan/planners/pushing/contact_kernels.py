@@ -70,7 +70,8 @@ def standoff_turned(contact: Contact, offset: float, c: float, s: float) -> tupl
     low, high = line(contact, offset)
     if low >= high:
         low = high = min(max(0.0, contact.low), contact.high)
-    best, at = -np.inf, 0.0
+    best = -np.inf
+    at = 0.0
     middle = 0.5 * (low + high)
     if contact.curvature < 0.0 and c > 1e-3:
         middle = (-s / (c * contact.curvature) - offset + contact.depth * s) / c
@@ -79,7 +80,8 @@ def standoff_turned(contact: Contact, offset: float, c: float, s: float) -> tupl
         lateral = offset - contact.depth * s + y * c
         x = contact.front + 0.5 * contact.curvature * lateral * lateral + contact.depth * c + y * s
         if x > best + 1e-12:
-            best, at = x, y
+            best = x
+            at = y
     return best, at
 
 
@@ -88,28 +90,42 @@ def _corner(
     contact: Contact, y: float, tilt: float, un: float, ut: float, w: float, out: FloatArray
 ) -> None:
     """The box pushed at one point (-a, y) whose normal has an angle ``tilt`` in the face frame."""
-    px, square = -contact.depth, contact.spread * contact.spread
-    cn, ct = un - w * y, ut + w * px  # velocity of the bumper at the point
+    px = -contact.depth
+    square = contact.spread * contact.spread
+    # velocity of the bumper at the point
+    cn = un - w * y
+    ct = ut + w * px
     total = square + px * px + y * y
     vn = ((square + px * px) * cn + px * y * ct) / total
     vt = (px * y * cn + (square + y * y) * ct) / total
-    nx, ny = np.cos(tilt), np.sin(tilt)
-    press, shear = vn * nx + vt * ny, vt * nx - vn * ny
+    nx = np.cos(tilt)
+    ny = np.sin(tilt)
+    press = vn * nx + vt * ny
+    shear = vt * nx - vn * ny
     out[3] = y
     if cn * nx + ct * ny <= 0.0:
         out[0] = out[1] = out[2] = 0.0
-        out[4], out[5] = float(FREE), 0.0
+        out[4] = float(FREE)
+        out[5] = 0.0
         return
     if press > 0.0 and abs(shear) <= contact.friction * press:
-        out[0], out[1], out[2] = vn, vt, (px * vt - y * vn) / square
-        out[4], out[5] = float(CORNER_STICK), shear / press
+        out[0] = vn
+        out[1] = vt
+        out[2] = (px * vt - y * vn) / square
+        out[4] = float(CORNER_STICK)
+        out[5] = shear / press
         return
     ratio = contact.friction if shear > 0.0 else -contact.friction
-    fx, fy = nx - ratio * ny, ny + ratio * nx
-    arm, lever = px * fy - y * fx, px * ny - y * nx
+    fx = nx - ratio * ny
+    fy = ny + ratio * nx
+    arm = px * fy - y * fx
+    lever = px * ny - y * nx
     push = (cn * nx + ct * ny) / max(1.0 + arm * lever / square, 0.05)
-    out[0], out[1], out[2] = push * fx, push * fy, push * arm / square
-    out[4], out[5] = float(CORNER_SLIDE), ratio
+    out[0] = push * fx
+    out[1] = push * fy
+    out[2] = push * arm / square
+    out[4] = float(CORNER_SLIDE)
+    out[5] = ratio
 
 
 @kernel
@@ -140,10 +156,14 @@ def _velocity(
 ) -> float:
     """`contact_velocity`; returns the x of the box's centre [m]."""
     x, touch = standoff_turned(contact, offset, c, s)
-    ux, uy = v - w * offset, w * x
-    un, ut = c * ux + s * uy, c * uy - s * ux
+    ux = v - w * offset
+    uy = w * x
+    un = c * ux + s * uy
+    ut = c * uy - s * ux
     low, high = line(contact, offset)
-    curvature, a, square = contact.curvature, contact.depth, contact.spread * contact.spread
+    curvature = contact.curvature
+    a = contact.depth
+    square = contact.spread * contact.spread
     if low >= high:
         _corner(contact, touch, 0.0, un, ut, w, out)
         return x
@@ -155,7 +175,8 @@ def _velocity(
     closing = w - off / dt
     normal = un + (closing - w) * touch
     # held fast: no motion along the bumper
-    vt, omega = ut, closing
+    vt = ut
+    omega = closing
     grip = 1.0 - curvature * a
     shear = vt * grip - curvature * square * omega
     mode = STICK
@@ -171,8 +192,12 @@ def _velocity(
     if normal > 1e-12:
         pressure = -(square * omega + a * vt) / normal
     if low <= pressure <= high:
-        out[0], out[1], out[2] = normal, vt, omega
-        out[3], out[4], out[5] = pressure, float(mode), shear / normal
+        out[0] = normal
+        out[1] = vt
+        out[2] = omega
+        out[3] = pressure
+        out[4] = float(mode)
+        out[5] = shear / normal
         return x
     y = high if pressure > high else low
     tilt = 0.0
@@ -186,7 +211,8 @@ def _velocity(
 @kernel
 def _drive(state: FloatArray, v: float, w: float, dt: float) -> None:
     """Move the robot along an arc and leave the box where it is on the ground."""
-    theta, turn = state[2], w * dt
+    theta = state[2]
+    turn = w * dt
     half = 0.5 * turn
     chord = v * dt * (np.sin(half) / half if abs(half) > 1e-9 else 1.0)
     state[0] += chord * np.cos(theta + half)
@@ -201,11 +227,15 @@ def _leave(
     """Offset, angle and gap when the robot has moved for ``dt`` and the box, at x ahead, stood."""
     turn = w * dt
     half = 0.5 * turn
-    ch, sh = np.cos(half), np.sin(half)
+    ch = np.cos(half)
+    sh = np.sin(half)
     chord = v * dt * (sh / half if abs(half) > 1e-9 else 1.0)
-    dx, dy = ahead - chord * ch, state[3] - chord * sh
-    c, s = ch * ch - sh * sh, 2.0 * ch * sh
-    offset, angle = c * dy - s * dx, state[4] - turn
+    dx = ahead - chord * ch
+    dy = state[3] - chord * sh
+    c = ch * ch - sh * sh
+    s = 2.0 * ch * sh
+    offset = c * dy - s * dx
+    angle = state[4] - turn
     return offset, angle, c * dx + s * dy - standoff(contact, offset, angle)[0]
 
 
@@ -257,7 +287,8 @@ def advance_box(
     out[:] = 0.0
     for _ in range(count):
         gap = max(state[5], 0.0)
-        c, s = np.cos(state[4]), np.sin(state[4])
+        c = np.cos(state[4])
+        s = np.sin(state[4])
         ahead = standoff_turned(contact, state[3], c, s)[0] + gap
         left = _leave(contact, state, ahead, v, w, step)
         if left[2] >= 1e-9:
@@ -267,7 +298,8 @@ def advance_box(
         fraction = gap / (gap - left[2]) if gap > 1e-9 and gap > left[2] else 0.0
         if fraction > 0.0:
             state[3], state[4], _ = _leave(contact, state, ahead, v, w, fraction * step)
-            c, s = np.cos(state[4]), np.sin(state[4])
+            c = np.cos(state[4])
+            s = np.sin(state[4])
         state[5] = 0.0
         if fraction < 1.0:
             _push(contact, state, c, s, v, w, (1.0 - fraction) * step, out)
@@ -294,9 +326,13 @@ def observe(
     contact: Contact, normal: float, robot: FloatArray, box: FloatArray, out: FloatArray
 ) -> None:
     """State (6,) of poses (3,) with the face's normal [rad]; the gap is negative in overlap."""
-    dx, dy = box[0] - robot[0], box[1] - robot[1]
-    c, s = np.cos(robot[2]), np.sin(robot[2])
-    out[0], out[1], out[2] = robot[0], robot[1], robot[2]
+    dx = box[0] - robot[0]
+    dy = box[1] - robot[1]
+    c = np.cos(robot[2])
+    s = np.sin(robot[2])
+    out[0] = robot[0]
+    out[1] = robot[1]
+    out[2] = robot[2]
     out[3] = c * dy - s * dx
     out[4] = wrap_angle(box[2] + normal - robot[2])
     out[5] = c * dx + s * dy - standoff(contact, out[3], out[4])[0]
@@ -306,7 +342,8 @@ def observe(
 def box_pose(contact: Contact, state: FloatArray, out: FloatArray) -> None:
     """x, y [m] of the box's centre and direction [rad] of the pushed face's normal, world."""
     x = standoff(contact, state[3], state[4])[0] + state[5]
-    c, s = np.cos(state[2]), np.sin(state[2])
+    c = np.cos(state[2])
+    s = np.sin(state[2])
     out[0] = state[0] + c * x - s * state[3]
     out[1] = state[1] + s * x + c * state[3]
     out[2] = state[2] + state[4]

@@ -125,23 +125,34 @@ def differentiate(
     out: FloatArray,
 ) -> None:
     """Derivatives of the first five residuals of a step into the first rows of ``out``."""
-    s, angle = state[3], state[4]
+    s = state[3]
+    angle = state[4]
     x = standoff(contact, s, angle)[0]
-    hs, ha = 0.01 * weights.half, 0.01
+    hs = 0.01 * weights.half
+    ha = 0.01
     x_s = (standoff(contact, s + hs, angle)[0] - standoff(contact, s - hs, angle)[0]) / (2.0 * hs)
     x_a = (standoff(contact, s, angle + ha)[0] - standoff(contact, s, angle - ha)[0]) / (2.0 * ha)
-    c, n = np.cos(state[2] - heading), np.sin(state[2] - heading)  # robot axes on the path's
-    cp, sp = np.cos(heading), np.sin(heading)
+    # robot axes on the path's
+    c = np.cos(state[2] - heading)
+    n = np.sin(state[2] - heading)
+    cp = np.cos(heading)
+    sp = np.sin(heading)
     root = np.sqrt(factor)
     away = max(1.0 - curvature * lateral, 0.2)
     fraction = s / weights.half
     rim = np.sqrt(weights.rim) if abs(fraction) > weights.safe else 0.0
     slope = (flush_angle(contact, s + hs) - flush_angle(contact, s - hs)) / (2.0 * hs)
     for j in range(rows.shape[1]):
-        dx, dy, dt, ds, da = rows[0, j], rows[1, j], rows[2, j], rows[3, j], rows[4, j]
+        dx = rows[0, j]
+        dy = rows[1, j]
+        dt = rows[2, j]
+        ds = rows[3, j]
+        da = rows[4, j]
         if dt == 0.0 and dx == 0.0 and dy == 0.0 and ds == 0.0:
             continue
-        ahead, left = x_s * ds + x_a * da, ds  # in robot axes
+        # in robot axes
+        ahead = x_s * ds + x_a * da
+        left = ds
         across = cp * dy - sp * dx + (c * x - n * s) * dt + n * ahead + c * left
         along = cp * dx + sp * dy - (n * x + c * s) * dt + c * ahead - n * left
         out[0, j] = root * across / weights.length
@@ -166,13 +177,14 @@ def add_command_costs(
     problem: PushingProblem, step: Step, nominal: FloatArray, memory: Memory
 ) -> float:
     """Add the cost of a step's commands to P and q; returns what the nominal ones cost."""
-    weights, units, hessian, gradient = (
-        problem.weights,
-        problem.units,
-        memory.hessian,
-        memory.gradient,
-    )
-    k, g, tau, moves = step.k, step.g, step.tau, nominal.shape[0]
+    weights = problem.weights
+    units = problem.units
+    hessian = memory.hessian
+    gradient = memory.gradient
+    k = step.k
+    g = step.g
+    tau = step.tau
+    moves = nominal.shape[0]
     value = 0.0
     rate = units[1] * weights.length / weights.max_speed
     first = k == 0 or problem.groups[k - 1] != g

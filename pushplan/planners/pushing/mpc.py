@@ -71,7 +71,8 @@ class PushingMpc:
         self._plan: Plan | None = None
         self._memory: PushingMemory | None = None
         self._clock = EpisodeClock(self.config.period)
-        self._out, self._gone = np.zeros(2), True
+        self._out = np.zeros(2)
+        self._gone = True
 
     @property
     def along(self) -> float:
@@ -118,7 +119,8 @@ class PushingMpc:
     def _follow(self, world: World, plan: Plan) -> Twist:
         self._prepare(world, plan)
         found = np.flatnonzero(world.movables.ids == plan.subtasks[0].object_ids[0])
-        out, held = self._out, self._clock.held
+        out = self._out
+        held = self._clock.held
         self._gone = len(found) == 0
         if self._gone:
             send(self._horizon, 0.0, 0.0, held, True, out)
@@ -132,7 +134,8 @@ class PushingMpc:
 
     def _prepare(self, world: World, plan: Plan) -> None:
         """Start afresh where the episode or the robot has changed."""
-        robot, config = world.robot, self.config
+        robot = world.robot
+        config = self.config
         if robot.drive is not Drive.DIFFERENTIAL:
             raise InvalidInputError("pushing along a path needs a differential drive")
         if not plan.subtasks or not plan.subtasks[0].object_ids:
@@ -140,7 +143,9 @@ class PushingMpc:
                 "the plan must name the box in its first sub-task, as PushPath.plan does"
             )
         if self._robot is not robot and self._robot != robot:
-            self._robot, self._plan, self._memory = robot, None, None
+            self._robot = robot
+            self._plan = None
+            self._memory = None
             self._horizon = make_horizon(robot, (0, 1), config.horizon, config.moves)
             self._solver = ProgramSolver(
                 self._horizon.program, config.tolerance, config.solver_iterations
@@ -150,7 +155,8 @@ class PushingMpc:
 
     def _begin(self, world: World, plan: Plan, k: int) -> None:
         """A new path: which face is pushed, and memory for the problem."""
-        self._plan, self._track = plan, track_of(plan)
+        self._plan = plan
+        self._track = track_of(plan)
         self._memory, self._models = _pushing_memory(
             world.robot, world.movables.outline(k), self.config, self._horizon
         )
@@ -158,7 +164,10 @@ class PushingMpc:
 
     def _step(self, world: World, pose: FloatArray, box: FloatArray) -> None:
         """Fill the command."""
-        memory, time, held, out = self._memory, world.time, self._clock.held, self._out
+        memory = self._memory
+        time = world.time
+        held = self._clock.held
+        out = self._out
         assert memory is not None
         if observe_push(memory, self._track, pose, box, time, held):
             solved = self._solve(memory)

@@ -130,7 +130,8 @@ def pressure_radius(outline: ArrayLike, support: str = "uniform") -> float:
     if support == "corners":
         return float(np.hypot(corners[:, 0], corners[:, 1]).mean())
     # triangles from the centroid: |r| is linear along rays, so only the angle needs quadrature
-    total, weight = 0.0, 0.0
+    total = 0.0
+    weight = 0.0
     nodes, weights = np.polynomial.legendre.leggauss(_RINGS)
     for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         cross = float(a[0] * b[1] - a[1] * b[0])

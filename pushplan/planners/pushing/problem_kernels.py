@@ -40,8 +40,11 @@ def _relative(
     contact: Contact, s: float, angle: float, v: float, w: float, dt: float, work: FloatArray
 ) -> tuple[float, float]:
     """Offset and angle after a step that begins in contact. ``work`` is (12,) memory."""
-    state, out = work[:6], work[6:]
-    state[3], state[4], state[5] = s, angle, 0.0
+    state = work[:6]
+    out = work[6:]
+    state[3] = s
+    state[4] = angle
+    state[5] = 0.0
     advance_box(contact, state, v, w, dt, out)
     return state[3], state[4]
 
@@ -99,7 +102,8 @@ def _propagate(
     for j in range(rows.shape[1]):
         rows[0, j] -= motion[4] * rows[2, j]
         rows[1, j] += motion[3] * rows[2, j]
-        s, a = rows[3, j], rows[4, j]
+        s = rows[3, j]
+        a = rows[4, j]
         rows[3, j] = slopes[0, 0] * s + slopes[0, 1] * a
         rows[4, j] = slopes[1, 0] * s + slopes[1, 1] * a
     rows[0, g] += motion[7] * units[0]
@@ -117,35 +121,43 @@ def _propagate(
 def assemble(problem: PushingProblem, nominal: FloatArray, memory: Memory) -> float:
     """Fill P and q over z = (v_0 .. v_M-1, w_0 .. w_M-1) in ``units``; returns the nominal cost."""
     contact, track, weights, start, along, _, units, steps, groups = problem
-    jacobian, residual, hessian, gradient, states = (
-        memory.jacobian,
-        memory.residual,
-        memory.hessian,
-        memory.gradient,
-        memory.states,
-    )
-    rows, motion, detail = memory.rows, memory.motion, memory.detail
-    slopes, scales, work = memory.slopes, memory.scales, memory.work
-    count, moves = steps.shape[0], nominal.shape[0]
+    jacobian = memory.jacobian
+    residual = memory.residual
+    hessian = memory.hessian
+    gradient = memory.gradient
+    states = memory.states
+    rows = memory.rows
+    motion = memory.motion
+    detail = memory.detail
+    slopes = memory.slopes
+    scales = memory.scales
+    work = memory.work
+    count = steps.shape[0]
+    moves = nominal.shape[0]
     jacobian[:] = 0.0
     hessian[:] = 0.0
     gradient[:] = 0.0
     rows[:] = 0.0
-    scales[0], scales[1] = 0.01 * weights.half, 0.02
-    scales[2], scales[3] = 0.05 * units[0], 0.02 * units[0] / weights.length
+    scales[0] = 0.01 * weights.half
+    scales[1] = 0.02
+    scales[2] = 0.05 * units[0]
+    scales[3] = 0.02 * units[0] / weights.length
     here = states[0]
     copy_into(here, start)
     here[0] += start[5] * np.cos(start[2])  # as if the gap had closed already
     here[1] += start[5] * np.sin(start[2])
     here[5] = 0.0
-    place, value = along, 0.0
+    place = along
+    value = 0.0
     unit = weights.length / weights.max_speed  # T [s]
     bx, by = _box(contact, here)
     _, index, fraction = locate(track, bx, by, place, place)
     curvature = errors(track, bx, by, here[2], index, fraction)[3]
     for k in range(count):
-        dt, g = steps[k], groups[k]
-        v, w = nominal[g, 0], nominal[g, 1]
+        dt = steps[k]
+        g = groups[k]
+        v = nominal[g, 0]
+        w = nominal[g, 1]
         tau = dt / unit
         wanted = min(track.speeds[index], weights.max_speed)
         wanted = min(wanted, max(track.lengths[-1] - place, 0.0) / dt)
@@ -186,11 +198,18 @@ def assemble(problem: PushingProblem, nominal: FloatArray, memory: Memory) -> fl
 def _square(problem: PushingProblem, nominal: FloatArray, memory: Memory) -> None:
     """Add JᵀJ to P and Jᵀ(r - J z) to q by loops over what is not zero."""
     # a threaded matrix product waits longer than it computes
-    jacobian, residual = memory.jacobian, memory.residual
-    hessian, gradient = memory.hessian, memory.gradient
-    product, pull, z, row = memory.product, memory.pull, memory.z, memory.row
-    units, groups = problem.units, problem.groups
-    moves, n = nominal.shape[0], gradient.shape[0]
+    jacobian = memory.jacobian
+    residual = memory.residual
+    hessian = memory.hessian
+    gradient = memory.gradient
+    product = memory.product
+    pull = memory.pull
+    z = memory.z
+    row = memory.row
+    units = problem.units
+    groups = problem.groups
+    moves = nominal.shape[0]
+    n = gradient.shape[0]
     product[:] = 0.0  # in the order v_0, w_0, v_1, ..: no command after its step
     pull[:] = 0.0
     for i in range(n):
@@ -230,5 +249,6 @@ def _square(problem: PushingProblem, nominal: FloatArray, memory: Memory) -> Non
 def _box(contact: Contact, state: FloatArray) -> tuple[float, float]:
     """The box's centre [m]."""
     x = standoff(contact, state[3], state[4])[0] + state[5]
-    c, s = np.cos(state[2]), np.sin(state[2])
+    c = np.cos(state[2])
+    s = np.sin(state[2])
     return state[0] + c * x - s * state[3], state[1] + s * x + c * state[3]

@@ -29,16 +29,19 @@ from pushplan.planners.pushing.cost_kernels import Memory, PushingProblem, Weigh
 from pushplan.planners.pushing.problem_kernels import assemble
 from pushplan.world.checks import FloatArray, IntArray
 
-_BACK, _WINDOW = 0.5, 2.0
+_BACK = 0.5
+_WINDOW = 2.0
 """How far the box's place may move back or ahead from one call to the next [L]."""
 _LEAST = 0.4
 """Least speed of a push that has not ended, as a fraction of the greatest, or of that at which the
 robot can turn within the distance to the box."""
 _LOOK = 4.0
 """Periods for which a command must stay clear of static things, or it is driven more slowly."""
-_BESIDE, _AHEAD = 1.5, 2.0
+_BESIDE = 1.5
+_AHEAD = 2.0
 """Greatest offset [half bumpers] and gap [L] that the problem is solved for."""
-_BLOCKED, _ASIDES = 0.5, 6
+_BLOCKED = 0.5
+_ASIDES = 6
 """Fraction of a command below which others are tried, and how many."""
 _TURNED = np.pi * 50.0 / 180.0  # angle at which another face is taken to be the pushed one
 _JUMP = 0.35  # a pose farther than this from the predicted one replaces it [L]
@@ -99,7 +102,9 @@ def observe_push(
         False at the end of the path.
     """
     memory.told[SLOWED] = 1.0
-    told, faces, at = memory.told, memory.faces, memory.box
+    told = memory.told
+    faces = memory.faces
+    at = memory.box
     contact = contact_now(memory)
     observe(contact, faces.normals[memory.face[0]], pose, box, memory.seen)
     if abs(memory.seen[4]) > _TURNED:
@@ -127,23 +132,30 @@ def observe_push(
 @kernel
 def take_face(memory: PushingMemory, direction: float) -> None:
     """Push the face that a direction [rad, box frame] meets most squarely; forget the state."""
-    scores, best = memory.faces.scores, -np.inf
-    c, s = np.cos(direction), np.sin(direction)
+    scores = memory.faces.scores
+    best = -np.inf
+    c = np.cos(direction)
+    s = np.sin(direction)
     for k in range(scores.shape[0]):
         score = scores[k, 0] * c + scores[k, 1] * s + scores[k, 2]
         if score > best:
-            best, memory.face[0] = score, k
+            best = score
+            memory.face[0] = k
     memory.told[OBSERVED] = 0.0
 
 
 @kernel
 def _correct(memory: PushingMemory, contact: Contact, size: float, time: float) -> None:
     """Correct the predicted state by a fixed fraction of what is observed, unless it jumps."""
-    told, seen, state, guess = memory.told, memory.seen, memory.state, memory.guess
+    told = memory.told
+    seen = memory.seen
+    state = memory.state
+    guess = memory.guess
     if told[OBSERVED] == 1.0 and memory.gain < 1.0 and time > told[SEEN_AT]:
         copy_into(guess, state)
         _predict(memory, contact, told[SEEN_AT], time)
-        far, turned = 0.0, 0.0
+        far = 0.0
+        turned = 0.0
         for j in range(6):
             change = seen[j] - guess[j]
             if j == 2 or j == 4:
@@ -152,20 +164,23 @@ def _correct(memory: PushingMemory, contact: Contact, size: float, time: float) 
             elif j > 2:
                 far = max(far, abs(change))
             state[j] = guess[j] + memory.gain * change
-        dx, dy = seen[0] - guess[0], seen[1] - guess[1]
+        dx = seen[0] - guess[0]
+        dy = seen[1] - guess[1]
         far = max(far, np.sqrt(dx * dx + dy * dy))
         if far / size >= _JUMP or turned >= _JUMP:
             copy_into(state, seen)
     else:
         copy_into(state, seen)
     state[5] = max(state[5], 0.0)
-    told[OBSERVED], told[SEEN_AT] = 1.0, time
+    told[OBSERVED] = 1.0
+    told[SEEN_AT] = time
 
 
 @kernel
 def _predict(memory: PushingMemory, contact: Contact, begin: float, end: float) -> None:
     """Move the guess on from one time to another by what takes effect in between."""
-    sent, count = memory.horizon.sent, memory.horizon.counts[UNDER_WAY]
+    sent = memory.horizon.sent
+    count = memory.horizon.counts[UNDER_WAY]
     for i in range(count):
         until = sent[i + 1, 0] if i + 1 < count else np.inf
         duration = min(until + memory.delay, end) - max(sent[i, 0] + memory.delay, begin)
@@ -176,7 +191,9 @@ def _predict(memory: PushingMemory, contact: Contact, begin: float, end: float) 
 @kernel
 def problem_now(memory: PushingMemory, track: ReferencePath, held: float) -> PushingProblem:
     """Lay the steps and the bounds, and put up the problem from the state in effect."""
-    horizon, contact, base = memory.horizon, contact_now(memory), memory.weights
+    horizon = memory.horizon
+    contact = contact_now(memory)
+    base = memory.weights
     length = contact.front + contact.depth
     lay_steps(horizon, memory.reach * length / base.max_speed, held)
     set_bounds(horizon, horizon.steps[0], horizon.steps[0])
@@ -185,7 +202,8 @@ def problem_now(memory: PushingMemory, track: ReferencePath, held: float) -> Pus
     least = _LEAST * min(1.0, horizon.limits.max_turn_rate * length / base.max_speed)
     for i in range(horizon.program.moves):
         horizon.program.low[i] = min(least, horizon.last[0] / base.max_speed + reach)
-    near, far = memory.near, _BESIDE * contact.half
+    near = memory.near
+    far = _BESIDE * contact.half
     copy_into(near, memory.guess)
     near[3] = min(max(near[3], -far), far)
     near[5] = min(near[5], _AHEAD * length)
@@ -226,7 +244,8 @@ def _begin_commands(memory: PushingMemory, held: float) -> None:
         _shift(memory, held)
     else:
         for i in range(horizon.program.moves):
-            horizon.nominal[i, 0], horizon.nominal[i, 1] = memory.weights.max_speed, 0.0
+            horizon.nominal[i, 0] = memory.weights.max_speed
+            horizon.nominal[i, 1] = 0.0
 
 
 @kernel
@@ -239,7 +258,8 @@ def assemble_push(memory: PushingMemory, track: ReferencePath, held: float) -> N
 @kernel
 def _shift(memory: PushingMemory, held: float) -> None:
     """Set the nominal commands to the last solution, moved on by the time since."""
-    horizon, groups = memory.horizon, memory.groups
+    horizon = memory.horizon
+    groups = memory.groups
     shift_steps(horizon, held)
     count = groups.shape[0]
     for k in range(count):
@@ -260,7 +280,8 @@ def drive_push(
 ) -> None:
     """Fill the command: of the solution, or the last one, as fast as what is static allows."""
     horizon = memory.horizon
-    counts, solution = horizon.counts, horizon.solution
+    counts = horizon.counts
+    solution = horizon.solution
     if solved:
         counts[MISSED] = 0
         keep_solution(horizon)
@@ -272,9 +293,12 @@ def drive_push(
     if counts[KNOWN] == 0:
         send_push(memory, 0.0, 0.0, time, held, out)
         return
-    contact, normal = contact_now(memory), memory.faces.normals[memory.face[0]]
-    v, w = solution[0, 0], solution[0, 1]
-    start, clearance = memory.guess, memory.clearance
+    contact = contact_now(memory)
+    normal = memory.faces.normals[memory.face[0]]
+    v = solution[0, 0]
+    w = solution[0, 1]
+    start = memory.guess
+    clearance = memory.clearance
     length = contact.front + contact.depth
     look = max(_LOOK * held, 2.0 * abs(v) / horizon.limits.max_acceleration)
     free = free_fraction(contact, normal, start, v, w, look, clearance, obstacles)
@@ -285,7 +309,8 @@ def drive_push(
             aside = w + (turn if i % 2 == 0 else -turn) * speed / length
             other = free_fraction(contact, normal, start, v, aside, look, clearance, obstacles)
             if other > free + _BLOCKED * turn:
-                free, w = other, aside
+                free = other
+                w = aside
                 break
     memory.told[SLOWED] = free
     send_push(memory, free * v, free * w, time, held, out)
@@ -305,6 +330,7 @@ def send_push(
 @kernel
 def begin_push(memory: PushingMemory, direction: float) -> None:
     """Begin a path with a push along ``direction`` [rad, box frame]."""
-    memory.told[ALONG], memory.told[SLOWED] = 0.0, 1.0
+    memory.told[ALONG] = 0.0
+    memory.told[SLOWED] = 1.0
     memory.horizon.counts[MISSED] = memory.horizon.counts[KNOWN] = 0
     take_face(memory, direction)

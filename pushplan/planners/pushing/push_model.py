@@ -150,6 +150,7 @@ class PushModel:
         if (steps <= 0.0).any():
             raise InvalidInputError(f"dt must be positive, got {steps.min()}")
         row = expect("state", state, PushState).row()
-        states, details = np.empty((count + 1, 6)), np.empty((count, 6))
+        states = np.empty((count + 1, 6))
+        details = np.empty((count, 6))
         contact_kernels.rollout(self.contact, row, commands, steps, states, details)
         return states, details

@@ -137,7 +137,9 @@ def find_route(
         target: index of the object that is to be pushed and must not be moved before; -1 if
             none.
     """
-    grid, problem, config = scene.fine.grid, scene.route_problem, scene.config
+    grid = scene.fine.grid
+    problem = scene.route_problem
+    config = scene.config
     nodes, extra = arrival_poses(grid, start)
     if not len(nodes):
         return None
@@ -152,7 +154,8 @@ def find_route(
     places = np.column_stack([grid.x + columns * grid.step, grid.y + rows * grid.step])
     every = places[np.concatenate([[True], (places[1:] != places[:-1]).any(axis=1)])]
     corners = _corners(places)
-    here, end = scene.world.robot_pose, float(start[2])
+    here = scene.world.robot_pose
+    end = float(start[2])
     ahead = scene.size * np.array([math.cos(here[2]), math.sin(here[2])])
     near = [here[:2], *(here[:2] + fraction * ahead for fraction in _AWAY)]
     around = target >= 0 and approach.target == target
@@ -191,7 +194,8 @@ def poses_along(scene: PushScene, route: Route) -> FloatArray:
 
 def simulate_route(scene: PushScene, route: Route) -> tuple[FloatArray, FloatArray] | None:
     """Poses of the robot (N, 3) and of the objects (N, K, 3) on a route; None if it jams."""
-    path, poses = poses_along(scene, route), scene.poses.copy()
+    path = poses_along(scene, route)
+    poses = scene.poses.copy()
     out = np.empty((len(path), len(poses), 3))
     jammed = sweep_path(path, poses, scene.bodies, scene.settings, out)
     return None if jammed >= 0 else (path, out)
@@ -236,7 +240,8 @@ def _corners(places: FloatArray) -> list[FloatArray]:
     """The corners of the lattice's path through places (N, 2), and the middles of long legs."""
     points = [places[0]]
     for before, here, after in zip(places, places[1:], places[2:], strict=False):
-        one, two = here - before, after - here
+        one = here - before
+        two = after - here
         bends = abs(one[0] * two[1] - one[1] * two[0]) > 1e-9 or float(one @ two) < 0.0
         stands = not one.any() or not two.any()
         if (bends or stands) and (here != points[-1]).any():

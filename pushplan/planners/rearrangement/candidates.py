@@ -133,7 +133,9 @@ def _attempts(scene: PushScene, k: int, row: PushPrimitive) -> Iterator[PushAtte
 
 def _line_attempts(scene: PushScene, k: int, row: PushPrimitive) -> Iterator[PushAttempt]:
     """Straight pushes across the open edges of an area that are not much farther than others."""
-    goal, box, nearest = scene.world.goal, scene.poses[k, :2], scene.remaining_now[k]
+    goal = scene.world.goal
+    box = scene.poses[k, :2]
+    nearest = scene.remaining_now[k]
     if not isinstance(goal, ClearanceArea):
         return
     for a, along, normal, length in open_edges(goal):
@@ -174,7 +176,8 @@ def _paths(
                     return
         yield path, None, ()
         return
-    movables, length = scene.movables, path_length(path)
+    movables = scene.movables
+    length = path_length(path)
     far = np.hypot(*(scene.poses[:, :2] - scene.poses[k, :2]).T)
     others = sorted((j for j in scene.left if j != k), key=lambda j: (far[j], j))
     for j in others[: row.partners]:

@@ -34,21 +34,28 @@ def along_path(
     x: float, y: float, path: FloatArray, reached: float, ahead: float
 ) -> tuple[float, float, float, float]:
     """The carrot (x, y), the arc length of the nearest point from ``reached`` on, its distance."""
-    best, at, arc = np.inf, reached, 0.0
+    best = np.inf
+    at = reached
+    arc = 0.0
     for i in range(path.shape[0] - 1):
-        dx, dy = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1]
+        dx = path[i + 1, 0] - path[i, 0]
+        dy = path[i + 1, 1] - path[i, 1]
         length = math.sqrt(dx * dx + dy * dy)
         if length > 0.0 and arc + length >= reached and arc <= reached + 3.0 * ahead:
             t = ((x - path[i, 0]) * dx + (y - path[i, 1]) * dy) / length
             t = min(max(t, max(0.0, reached - arc)), length)
-            px, py = path[i, 0] + t / length * dx, path[i, 1] + t / length * dy
+            px = path[i, 0] + t / length * dx
+            py = path[i, 1] + t / length * dy
             away = math.sqrt((px - x) ** 2 + (py - y) ** 2)
             if away < best:
-                best, at = away, arc + t
+                best = away
+                at = arc + t
         arc += length
-    target, arc = at + ahead, 0.0
+    target = at + ahead
+    arc = 0.0
     for i in range(path.shape[0] - 1):
-        dx, dy = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1]
+        dx = path[i + 1, 0] - path[i, 0]
+        dy = path[i + 1, 1] - path[i, 1]
         length = math.sqrt(dx * dx + dy * dy)
         if length > 0.0 and (arc + length >= target or i == path.shape[0] - 2):
             t = (target - arc) / length  # beyond the end the last leg goes on
@@ -60,9 +67,12 @@ def along_path(
 @kernel
 def is_on_bumper(robot: FloatArray, target: FloatArray, controller: PushingController) -> bool:
     """Whether the middle of an object at a pose (3,) is in front of the bumper."""
-    gx, gy = target[0] - robot[0], target[1] - robot[1]
-    c, s = math.cos(robot[2]), math.sin(robot[2])
-    side, forward = c * gy - s * gx, c * gx + s * gy
+    gx = target[0] - robot[0]
+    gy = target[1] - robot[1]
+    c = math.cos(robot[2])
+    s = math.sin(robot[2])
+    side = c * gy - s * gx
+    forward = c * gx + s * gy
     return bool(abs(side) < 0.95 * controller.half and forward > 0.5 * controller.front)
 
 
@@ -79,8 +89,10 @@ def steer_push(
     cx, cy, at, _ = along_path(target[0], target[1], path, reached, controller.ahead)
     heading = math.atan2(cy - target[1], cx - target[0])
     error = wrap_angle(heading - robot[2])
-    gx, gy = target[0] - robot[0], target[1] - robot[1]
-    ux, uy = math.cos(heading), math.sin(heading)
+    gx = target[0] - robot[0]
+    gy = target[1] - robot[1]
+    ux = math.cos(heading)
+    uy = math.sin(heading)
     left = gx * uy - gy * ux
     holds = is_on_bumper(robot, target, controller) and abs(error) < 1.75
     correction = error - math.atan((left - shift) / controller.size)

@@ -26,7 +26,8 @@ def cost_to_go(
     every = (1 << objects) - 1
     best = np.empty((every + 1, count + 1))
     following = np.empty((every + 1, count + 1), dtype=np.int64)
-    best[:], following[:] = np.inf, -1
+    best[:] = np.inf
+    following[:] = -1
     best[every] = 0.0
     for mask in range(every - 1, -1, -1):
         for last in range(count + 1):

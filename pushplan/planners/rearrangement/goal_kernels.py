@@ -37,8 +37,10 @@ def _may_be_done(x: float, y: float, goal: ObjectGoal) -> bool:
     count = goal.polygon.shape[0]
     for i in range(count):
         j = i + 1 if i + 1 < count else 0
-        ax, ay = goal.polygon[i, 0], goal.polygon[i, 1]
-        ex, ey = goal.polygon[j, 0] - ax, goal.polygon[j, 1] - ay
+        ax = goal.polygon[i, 0]
+        ay = goal.polygon[i, 1]
+        ex = goal.polygon[j, 0] - ax
+        ey = goal.polygon[j, 1] - ay
         if ex * (y - ay) - ey * (x - ax) < 0.0:
             return True
     return False
@@ -51,7 +53,8 @@ def is_done(k: int, poses: FloatArray, bodies: Bodies, goal: ObjectGoal) -> bool
         return True
     if not _may_be_done(poses[k, 0], poses[k, 1], goal):
         return False
-    a, b = bodies.offsets[k], bodies.offsets[k + 1]
+    a = bodies.offsets[k]
+    b = bodies.offsets[k + 1]
     outline = np.empty((b - a, 2))
     transform_points(poses[k], bodies.vertices[a:b], outline)
     if goal.is_receptacle:

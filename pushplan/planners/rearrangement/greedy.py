@@ -82,7 +82,8 @@ class GreedyPusher(RearrangementPolicy):
 
     def _work(self, scene: PushScene) -> Twist | None:
         """The next command of the attempt in hand or of a new one; None where it has ended."""
-        world, response = scene.world, self.config.response
+        world = scene.world
+        response = self.config.response
         self._attempt = attempt = self._attempt or self._choose(scene)
         if attempt is None:
             return None
@@ -98,7 +99,8 @@ class GreedyPusher(RearrangementPolicy):
     def _drive(self, attempt: _Attempt, scene: PushScene) -> Twist | None:
         """Get behind the box, and then push it; None where that fails."""
         if not attempt.pushing:
-            pose, time = scene.world.robot_pose, scene.world.time
+            pose = scene.world.robot_pose
+            time = scene.world.time
             command = attempt.driver.command(pose, time, self._clock.held)
             attempt.pushing = attempt.driver.arrived
             if not attempt.pushing:
@@ -107,7 +109,8 @@ class GreedyPusher(RearrangementPolicy):
 
     def _choose(self, scene: PushScene) -> _Attempt | None:
         """The nearest box that the robot can get behind, of those that failed least often."""
-        world, failures = scene.world, self._failures
+        world = scene.world
+        failures = self._failures
         if world.time < self._wait_until:
             return None
         away = np.hypot(*(scene.poses[:, :2] - world.robot_pose[:2]).T)
@@ -172,14 +175,16 @@ def line_up(scene: PushScene, k: int, skip: int = 0) -> LineUp | None:
     path = shortest_path(scene, k)
     if path is None:
         return None
-    robot, static = scene.world.robot, scene.world.static
+    robot = scene.world.robot
+    static = scene.world.static
     outline = scene.movables.outline_world(k)
     around = StaticMap((*static.polygons, outline), static.segments, static.radii, static.bounds)
     towards = initial_heading(path, scene.controller.ahead)
     found = []
     for clearance in (scene.size, 0.5 * (scene.size + robot.inscribed_radius)):
         for turn, fraction in _STARTS:
-            heading, shift = towards + turn, fraction * scene.half
+            heading = towards + turn
+            shift = fraction * scene.half
             start = scene.pose_behind(k, heading, shift)
             legs = _legs_to(scene, around, start, clearance)
             if legs is not None:
@@ -199,7 +204,8 @@ def _legs_to(
     The last leg is straight, from where the robot can turn. Beside a wall it may come from
     farther out, and the robot turns at the end by as much.
     """
-    behind, heading = start[:2], float(start[2])
+    behind = start[:2]
+    heading = float(start[2])
     if not scene.fits(start):
         return None
     for lean in _LEANS:

@@ -76,7 +76,9 @@ class GtspMpc(RearrangementPolicy):
         self._away: Retreat | PoseFollower | None = None
         self._cache = RolloutCache()
         self._history = PushHistory()
-        self._left, self._rounds, self._stuck = -1, 0, 0
+        self._left = -1
+        self._rounds = 0
+        self._stuck = 0
         self._way_at_end = math.inf
         self._recovered_from: FloatArray | None = None
         self._stopped_at: PushScene | None = None
@@ -110,16 +112,22 @@ class GtspMpc(RearrangementPolicy):
         scene = PushScene(world, self.config, self._cache)
         left = len(scene.left)
         if left != self._left:  # something was done, or has come back
-            self._left, self._rounds, self._stopped_at = left, 0, None
+            self._left = left
+            self._rounds = 0
+            self._stopped_at = None
             self._way_at_end = math.inf
             self._history.count_progress(self.config)
         if not left:
-            self._execution, self.given_up, self.plan, self.current_plan = None, {}, (), None
+            self._execution = None
+            self.given_up = {}
+            self.plan = ()
+            self.current_plan = None
             self._forget_choice()
             return Twist(0.0, 0.0)
         if self._stopped_at is not None and _alike(scene, self._stopped_at):
             return Twist(0.0, 0.0)
-        searched, held = False, self._clock.held
+        searched = False
+        held = self._clock.held
         for _ in range(4):  # jobs that end at once
             if self._away is not None:
                 away = self._away.command(world.robot_pose, world.time, held)
@@ -183,7 +191,8 @@ class GtspMpc(RearrangementPolicy):
 
     def _begin(self, scene: PushScene, choice: PushChoice) -> bool:
         """Take up the best push, or else leave a tight place; whether there is anything to do."""
-        self.graph, self.plan = choice.graph, choice.plan
+        self.graph = choice.graph
+        self.plan = choice.plan
         self.given_up = dict(choice.graph.infeasible)
         if choice.first is not None:
             push = choice.first.push
@@ -195,7 +204,8 @@ class GtspMpc(RearrangementPolicy):
                 predictive=self.config.mpc and signature(push) not in self._history.failures,
             )
             return True
-        here, before = scene.world.robot_pose, self._recovered_from
+        here = scene.world.robot_pose
+        before = self._recovered_from
         moved = before is None or bool(np.abs(before - here).max() > 0.02 * scene.size)
         if choice.way_out is not None and moved:
             self._recovered_from = here
@@ -223,13 +233,16 @@ class GtspMpc(RearrangementPolicy):
         if not tried or way >= self._way_at_end - scene.size:
             self._stopped_at = scene
             return False
-        self._way_at_end, self._rounds = way, 0
+        self._way_at_end = way
+        self._rounds = 0
         self._history = PushHistory()
         return True
 
     def _close(self, scene: PushScene, execution: PushExecution, end: ExecutionEnd) -> None:
         """Draw the conclusions from how an execution ended."""
-        self._execution, self.current_plan, push = None, None, execution.push
+        self._execution = None
+        self.current_plan = None
+        push = execution.push
         if end is ExecutionEnd.DONE and not push.relocates:
             self._stuck = 0
             return
@@ -238,7 +251,8 @@ class GtspMpc(RearrangementPolicy):
         if end is ExecutionEnd.DONE:
             self._history.count_relocation(push)
         if end is ExecutionEnd.STUCK:
-            robot, pose = scene.world.robot, scene.world.robot_pose
+            robot = scene.world.robot
+            pose = scene.world.robot_pose
             self._away = Retreat(robot, pose, _RETREAT * scene.size, self._stuck)
             self._stuck += 1
 

@@ -45,7 +45,8 @@ class Gtsp(RearrangementPolicy):
             self._route_follower = LegFollower(
                 world.robot, self._path(world), response=self.config.response
             )
-        pose, follower = world.robot_pose, self._route_follower
+        pose = world.robot_pose
+        follower = self._route_follower
         command = follower.command(pose, world.time, self._clock.held)
         while command is None and not follower.arrived:
             follower.skip()
@@ -82,7 +83,8 @@ class Gtsp(RearrangementPolicy):
 
 def _pushes(scene: PushScene, k: int) -> list[tuple[int, FloatArray, FloatArray]]:
     """The object, where the robot's middle begins and where it ends, for every straight push."""
-    goal, box = scene.world.goal, scene.poses[k, :2]
+    goal = scene.world.goal
+    box = scene.poses[k, :2]
     radius = float(scene.movables.radii[k])
     if isinstance(goal, ClearanceArea):
         moves = [

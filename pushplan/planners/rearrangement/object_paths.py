@@ -82,7 +82,8 @@ def _path(
         return None
     points = path.points
     if isinstance(goal, Receptacle):  # on to its far side, where it may be pushed
-        middle, last = goal.polygon.mean(axis=0), points[-1]
+        middle = goal.polygon.mean(axis=0)
+        last = points[-1]
         points = np.concatenate([points, (middle + 0.6 * (middle - last))[None]])
     steps = np.hypot(*np.diff(points, axis=0).T)
     points = points[np.concatenate([[True], steps > 1e-6 * radius])]
@@ -126,7 +127,8 @@ class PushCostToGo:
         config: RelocationConfig,
     ) -> None:
         self._drag_cost = config.drag_cost
-        low, high = static.bounds[:2], static.bounds[2:]
+        low = static.bounds[:2]
+        high = static.bounds[2:]
         sides = high - low
         self._step = max(config.cell * robot.circumscribed_radius, float(sides.max()) / _MOST_CELLS)
         cols, rows = (int(side) for side in np.floor(sides / self._step) + 1)
@@ -155,7 +157,9 @@ class PushCostToGo:
         """(rows, cols) cost of the way from each cell [m]."""
         rows, cols = is_open.shape
         i, j = np.nonzero(is_open)
-        a, b = i + MOVES[:, 1:], j + MOVES[:, :1]  # (16, cells)
+        # (16, cells)
+        a = i + MOVES[:, 1:]
+        b = j + MOVES[:, :1]
         leads_on = (0 <= a) & (a < rows) & (0 <= b) & (b < cols)
         leads_on[leads_on] = is_open[a[leads_on], b[leads_on]]
         t, at = np.nonzero(leads_on)

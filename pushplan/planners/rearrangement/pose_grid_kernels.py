@@ -58,7 +58,8 @@ class PoseGrid(NamedTuple):
 @kernel(allocates=True)
 def block_poses(grid: PoseGrid, shape: Footprint, among: ConvexObstacles) -> None:
     """Mark the poses at which the footprint touches an obstacle."""
-    pose, scratch = np.empty(3), np.empty_like(shape.vertices)
+    pose = np.empty(3)
+    scratch = np.empty_like(shape.vertices)
     count, rows, cols = grid.blocked.shape
     for t in range(count):
         pose[2] = HEADINGS[t]
@@ -72,11 +73,14 @@ def block_poses(grid: PoseGrid, shape: Footprint, among: ConvexObstacles) -> Non
 @kernel(allocates=True)
 def block_moves(grid: PoseGrid, shape: Footprint, among: ConvexObstacles) -> None:
     """Mark the moves between free poses on which the footprint touches an obstacle."""
-    pose, scratch = np.empty(3), np.empty_like(shape.vertices)
-    blocked, step = grid.blocked, grid.step
+    pose = np.empty(3)
+    scratch = np.empty_like(shape.vertices)
+    blocked = grid.blocked
+    step = grid.step
     count, rows, cols = blocked.shape
     for t in range(count):
-        dx, dy = MOVES[t, 0], MOVES[t, 1]
+        dx = MOVES[t, 0]
+        dy = MOVES[t, 1]
         other = t + 1 if t + 1 < count else 0
         between = math.ceil(2.0 * math.hypot(dx, dy))
         for i in range(rows):
@@ -92,7 +96,8 @@ def block_moves(grid: PoseGrid, shape: Footprint, among: ConvexObstacles) -> Non
                             grid.blocked_moves[0, t, i, j] = True
                             break
                 if not blocked[other, i, j]:
-                    pose[0], pose[1] = grid.x + j * step, grid.y + i * step
+                    pose[0] = grid.x + j * step
+                    pose[1] = grid.y + i * step
                     for n in range(1, 3):
                         pose[2] = HEADINGS[t] + TURNS[t] * n / 3.0
                         if not is_free(pose, shape, among, scratch):
@@ -104,11 +109,16 @@ def block_moves(grid: PoseGrid, shape: Footprint, among: ConvexObstacles) -> Non
 def near_poses(grid: PoseGrid, pose: FloatArray, reach: float) -> tuple[IntArray, FloatArray]:
     """Flat indices of free poses within ``reach`` cells of a pose (3,), and the cost there [m]."""
     count, rows, cols = grid.blocked.shape
-    u, v = (pose[0] - grid.x) / grid.step, (pose[1] - grid.y) / grid.step
-    i0, i1 = max(0, math.ceil(v - reach)), min(rows - 1, math.floor(v + reach))
-    j0, j1 = max(0, math.ceil(u - reach)), min(cols - 1, math.floor(u + reach))
+    u = (pose[0] - grid.x) / grid.step
+    v = (pose[1] - grid.y) / grid.step
+    i0 = max(0, math.ceil(v - reach))
+    i1 = min(rows - 1, math.floor(v + reach))
+    j0 = max(0, math.ceil(u - reach))
+    j1 = min(cols - 1, math.floor(u + reach))
     most = count * max(0, i1 - i0 + 1) * max(0, j1 - j0 + 1)
-    found, costs, n = np.empty(most, dtype=np.int64), np.empty(most), 0
+    found = np.empty(most, dtype=np.int64)
+    costs = np.empty(most)
+    n = 0
     for t in range(count):
         turn = abs((HEADINGS[t] - pose[2] + math.pi) % (2.0 * math.pi) - math.pi)
         if turn >= 0.5:
@@ -128,10 +138,13 @@ def contact_depths(grid: PoseGrid, shape: Footprint, poses: FloatArray, bodies: 
     """(K, 16, rows, columns) how deep the footprint is in each of the objects [m]."""
     count, rows, cols = grid.blocked.shape
     out = np.zeros((poses.shape[0], count, rows, cols), dtype=np.float32)
-    outline, moved = np.empty_like(bodies.vertices), np.empty_like(bodies.vertices)
-    pose, body = np.zeros(3), np.empty_like(shape.vertices)
+    outline = np.empty_like(bodies.vertices)
+    moved = np.empty_like(bodies.vertices)
+    pose = np.zeros(3)
+    body = np.empty_like(shape.vertices)
     for k in range(poses.shape[0]):
-        a, b = bodies.offsets[k], bodies.offsets[k + 1]
+        a = bodies.offsets[k]
+        b = bodies.offsets[k + 1]
         transform_points(poses[k], bodies.vertices[a:b], outline[a:b])
         reach = shape.radius + bodies.radii[k]
         i0 = max(0, math.ceil((poses[k, 1] - reach - grid.y) / grid.step))
@@ -145,12 +158,14 @@ def contact_depths(grid: PoseGrid, shape: Footprint, poses: FloatArray, bodies: 
                 y = grid.y + i * grid.step
                 for j in range(j0, j1 + 1):
                     x = grid.x + j * grid.step
-                    dx, dy = poses[k, 0] - x, poses[k, 1] - y
+                    dx = poses[k, 0] - x
+                    dy = poses[k, 1] - y
                     if dx * dx + dy * dy >= reach * reach or grid.blocked[t, i, j]:
                         continue
                     deepest = 0.0
                     for n in range(a, b):
-                        moved[n, 0], moved[n, 1] = outline[n, 0] - x, outline[n, 1] - y
+                        moved[n, 0] = outline[n, 0] - x
+                        moved[n, 1] = outline[n, 1] - y
                     for p in range(shape.offsets.shape[0] - 1):
                         part = body[shape.offsets[p] : shape.offsets[p + 1]]
                         deepest = max(deepest, convex_penetration(part, moved[a:b])[0])
@@ -163,7 +178,8 @@ def add_layers(layers: Layers, weights: FloatArray) -> tuple[FloatArray, FloatAr
     """Depth in all objects of weight at each pose [m], and the weights (K,) of those it is in."""
     count, turns, rows, cols = layers.shape
     flat = layers.reshape((count, turns * rows * cols))
-    depths, touch = np.zeros(flat.shape[1]), np.zeros(flat.shape[1])
+    depths = np.zeros(flat.shape[1])
+    touch = np.zeros(flat.shape[1])
     for k in range(count):
         if weights[k] == 0.0:
             continue

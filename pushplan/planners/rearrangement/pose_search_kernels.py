@@ -46,7 +46,8 @@ def _unlink(node: int, heads: IntArray, after: IntArray, ahead: IntArray) -> Non
 @kernel(inline=True)
 def _link(node: int, bucket: int, heads: IntArray, after: IntArray, ahead: IntArray) -> None:
     """Put a node that is in no bucket into one."""
-    after[node], ahead[node] = heads[bucket], -2 - bucket
+    after[node] = heads[bucket]
+    ahead[node] = -2 - bucket
     if heads[bucket] >= 0:
         ahead[heads[bucket]] = node
     heads[bucket] = node
@@ -57,11 +58,13 @@ def _deal(
     best: FloatArray, width: float, heads: IntArray, after: IntArray, ahead: IntArray
 ) -> float:
     """Put the poses that wait in the last bucket where they belong; returns the least cost."""
-    base, node = np.inf, heads[_BUCKETS]
+    base = np.inf
+    node = heads[_BUCKETS]
     while node >= 0:
         base = min(base, best[node])
         node = after[node]
-    node, heads[_BUCKETS] = heads[_BUCKETS], -1
+    node = heads[_BUCKETS]
+    heads[_BUCKETS] = -1
     while node >= 0:
         following = after[node]
         _link(node, int(min((best[node] - base) / width, _BUCKETS)), heads, after, ahead)
@@ -81,7 +84,8 @@ def _beside(
     count, rows, cols = shape
     if move < 2:
         sign = 1 - 2 * move
-        i, j = i + sign * MOVES[t, 1], j + sign * MOVES[t, 0]
+        i = i + sign * MOVES[t, 1]
+        j = j + sign * MOVES[t, 0]
         if i < 0 or j < 0 or i >= rows or j >= cols:
             return -1, t
         return (t * rows + i) * cols + j, t
@@ -95,19 +99,28 @@ def search_poses(problem: PoseSearchProblem) -> tuple[FloatArray, IntArray]:
     """Cost of each pose [m] and the pose before it, by buckets (Dial 1969, Meyer, Sanders 2003)."""
     # poses are expanded bucket by bucket of about equal costs, and again where they get cheaper;
     # what lies beyond the last bucket waits for another round
-    grid, depths, targets = problem.grid, problem.depths, problem.targets
-    total, (_, rows, cols) = depths.size, depths.shape
-    best, before = np.empty(total), np.empty(total, dtype=np.int64)
+    grid = problem.grid
+    depths = problem.depths
+    targets = problem.targets
+    total = depths.size
+    (_, rows, cols) = depths.shape
+    best = np.empty(total)
+    before = np.empty(total, dtype=np.int64)
     best[:] = np.inf
     before[:] = -1
-    flat, shut, near = depths.ravel(), grid.blocked.ravel(), problem.touch.ravel()
-    ahead_shut, turn_shut = grid.blocked_moves[0].ravel(), grid.blocked_moves[1].ravel()
+    flat = depths.ravel()
+    shut = grid.blocked.ravel()
+    near = problem.touch.ravel()
+    ahead_shut = grid.blocked_moves[0].ravel()
+    turn_shut = grid.blocked_moves[1].ravel()
     # doubly linked lists; the first of bucket b has -2 - b ahead of it, -1 is in no bucket
-    after, ahead = np.empty(total, dtype=np.int64), np.empty(total, dtype=np.int64)
+    after = np.empty(total, dtype=np.int64)
+    ahead = np.empty(total, dtype=np.int64)
     heads = np.empty(_BUCKETS + 1, dtype=np.int64)
     ahead[:] = -1
     heads[:] = -1
-    width, met = _WIDTH * grid.step, 0
+    width = _WIDTH * grid.step
+    met = 0
     for s in range(problem.starts.shape[0]):
         node = problem.starts[s]
         if problem.costs[s] < best[node]:
@@ -126,7 +139,8 @@ def search_poses(problem: PoseSearchProblem) -> tuple[FloatArray, IntArray]:
                 _unlink(node, heads, after, ahead)
                 row = node // cols
                 t = row // rows
-                i, j = row - t * rows, node - row * cols
+                i = row - t * rows
+                j = node - row * cols
                 for move in range(4):
                     other, heading = _beside(t, i, j, move, depths.shape)
                     if other < 0 or shut[other]:
@@ -163,7 +177,8 @@ class Arrivals(NamedTuple):
 @kernel(allocates=True)
 def least_costs(costs: FloatArray, arrivals: Arrivals) -> FloatArray:
     """(N,) cost of getting to each of some places [m], from what `search_poses` returns."""
-    out, at = np.empty(arrivals.ends.shape[0]), 0
+    out = np.empty(arrivals.ends.shape[0])
+    at = 0
     out[:] = np.inf
     for n in range(arrivals.ends.shape[0]):
         while at < arrivals.ends[n]:

@@ -130,13 +130,18 @@ def push_plan(world: World, route: Legs | None, push: Push) -> Plan:
         route: to the start of the push; None if the robot is there.
         push: the push.
     """
-    robot, way = world.robot, _way(world, route)
+    robot = world.robot
+    way = _way(world, route)
     poses = np.concatenate([way, push.poses])
-    along, first = arc_lengths(poses), len(way)
-    lengths, turns = step_lengths(poses), wrap_angle(np.diff(poses[:, 2]))
+    along = arc_lengths(poses)
+    first = len(way)
+    lengths = step_lengths(poses)
+    turns = wrap_angle(np.diff(poses[:, 2]))
     signs = np.where(goes_back(poses, robot.circumscribed_radius), -1.0, 1.0)
     steps = np.maximum(lengths / robot.max_speed, np.abs(turns) / robot.max_turn_rate)
-    speeds, turn_rates, moving = signs * robot.max_speed, np.zeros(len(poses)), steps > 0.0
+    speeds = signs * robot.max_speed
+    turn_rates = np.zeros(len(poses))
+    moving = steps > 0.0
     np.divide(signs[:-1] * lengths, steps, out=speeds[:-1], where=moving)
     speeds[:-1][lengths < _STILL * robot.circumscribed_radius] = 0.0
     np.divide(turns, steps, out=turn_rates[:-1], where=moving)
@@ -146,7 +151,8 @@ def push_plan(world: World, route: Legs | None, push: Push) -> Plan:
     gone = ends[:, 0] >= 0.5 * REMOVED
     ahead = np.max(robot.vertices[:, 0]) + _INSIDE * world.movables.radii[gone]
     x, y, theta = poses[-1]
-    ends[gone, 0], ends[gone, 1] = x + ahead * np.cos(theta), y + ahead * np.sin(theta)
+    ends[gone, 0] = x + ahead * np.cos(theta)
+    ends[gone, 1] = y + ahead * np.sin(theta)
     moves = ends - start
     moves[:, 2] = wrap_angle(moves[:, 2])
     return Plan(

@@ -37,7 +37,9 @@ from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import path_length, path_lengths
 from pushplan.world.stop import wants_own_budget
 
-_ROBOT, _OBJECT = 0.5, 0.2  # how far a scene may be from the predicted one [circumscribed radii]
+# how far a scene may be from the predicted one [circumscribed radii]
+_ROBOT = 0.5
+_OBJECT = 0.2
 _MOST_APPROACHES = 150
 """Ends of pushes from which approaches are searched for; up to 50 objects have no more."""
 _FAR = 5.0  # cost of getting to what cannot be got to later [diagonals of the map]
@@ -99,7 +101,9 @@ class PendingChoice:
         """Whether what was chosen is good for the scene that has come."""
         if not self.ahead:
             return True
-        then, now, size = self.scene, scene, scene.size
+        then = self.scene
+        now = scene
+        size = scene.size
         ids = now.movables.ids[~now.done]
         if not np.array_equal(ids, then.movables.ids[~then.done]):
             return False
@@ -149,7 +153,8 @@ def choose_push(
 
 def scene_after(scene: PushScene, push: Push) -> PushScene:
     """The scene that is expected at the end of a push."""
-    world, after = scene.world, push.object_poses
+    world = scene.world
+    after = push.object_poses
     there = np.flatnonzero(after[:, 0] < 0.5 * REMOVED)
     movables = world.movables.select(there).moved_to(after[there])
     moved = replace(world, robot_pose=push.end, robot_twist=np.zeros(3), movables=movables)
@@ -255,7 +260,8 @@ def build_push_graph(
     row = least_costs(approach.costs, arrivals_at(scene.fine.grid, pushes))
     extra = np.array([penalty(push) for push in pushes])
     keep = _best(scene, pushes, row + extra)
-    pushes, row = [pushes[n] for n in keep], row[keep]
+    pushes = [pushes[n] for n in keep]
+    row = row[keep]
     push_costs = np.array([push.cost for push in pushes]) + extra[keep]
     costs = np.zeros((1, 0))
     if pushes:
@@ -314,7 +320,9 @@ def _between(scene: PushScene, pushes: Sequence[Push]) -> FloatArray:
     What cannot be got to from there, as far as one can say now, is put off rather than ruled out:
     otherwise one object would be enough for there to be no order at all.
     """
-    grid, ids, bounds = scene.coarse.grid, scene.movables.ids, scene.world.static.bounds
+    grid = scene.coarse.grid
+    ids = scene.movables.ids
+    bounds = scene.world.static.bounds
     far = _FAR * float(np.hypot(*(bounds[2:] - bounds[:2])))
     arrivals = arrivals_at(grid, pushes)
     out = np.full((len(pushes), len(pushes)), far)

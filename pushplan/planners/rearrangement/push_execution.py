@@ -49,7 +49,8 @@ class GeometricPusher:
     """
 
     def __init__(self, controller: PushingController, shift: float = 0.0) -> None:
-        self._controller, self._shift = controller, shift
+        self._controller = controller
+        self._shift = shift
         self._clock = EpisodeClock(1.0)
         self._plan: Plan | None = None
         self.along = 0.0
@@ -67,10 +68,12 @@ class GeometricPusher:
 
     def _follow(self, world: World, plan: Plan) -> Twist:
         if plan is not self._plan:
-            self._plan, self.along = plan, 0.0
+            self._plan = plan
+            self.along = 0.0
             self._path = np.ascontiguousarray(plan.poses[:, :2])
         found = np.flatnonzero(world.movables.ids == plan.subtasks[0].object_ids[0])
-        step, turn = self._controller.step, 0.0
+        step = self._controller.step
+        turn = 0.0
         if len(found):
             step, turn, self.along, _ = steer_push(
                 np.array(world.robot_pose),
@@ -97,7 +100,8 @@ class PathPush:
         self, scene: PushScene, target: int, path: PushPath, pusher: GeometricPusher | PushingMpc
     ) -> None:
         robot = scene.world.robot
-        self._plan, self._pusher = path.plan(robot, target), pusher
+        self._plan = path.plan(robot, target)
+        self._pusher = pusher
         patience = max(scene.size / robot.max_speed, _TURN_PATIENCE / robot.max_turn_rate)
         self._progress = ProgressChecker(_PROGRESS * scene.size, patience)
 
@@ -161,11 +165,16 @@ class PushExecution:
         *,
         predictive: bool = True,
     ) -> None:
-        self.push, self.route, self.pushing = push, route, False
-        self.ids, self.asked_for_next = scene.movables.ids, False
-        self._executor, self._predictive = executor, predictive
+        self.push = push
+        self.route = route
+        self.pushing = False
+        self.ids = scene.movables.ids
+        self.asked_for_next = False
+        self._executor = executor
+        self._predictive = predictive
         self._prediction: PendingResult[list[Push]] | None = None
-        robot, config = scene.world.robot, scene.config
+        robot = scene.world.robot
+        config = scene.config
         self._route_follower = LegFollower(
             robot,
             route,
@@ -228,12 +237,15 @@ class PushExecution:
         self.push = max(
             good, key=lambda end: (len(set(end.delivers) & set(push.delivers)), -end.length)
         )
-        self.pushing, self._pusher = True, self._choose_pusher(scene, held)
+        self.pushing = True
+        self._pusher = self._choose_pusher(scene, held)
         return True
 
     def _choose_pusher(self, scene: PushScene, held: float) -> Pusher:
         """What drives the push: along its poses, its line or the path of its object."""
-        push, config, world = self.push, scene.config, scene.world
+        push = self.push
+        config = scene.config
+        world = scene.world
         if push.controller == "arc":
             follower = PoseFollower(world.robot, push.poses, config.response)
             return lambda now, held: follower.command(now.world.robot_pose, now.world.time, held)
@@ -254,7 +266,8 @@ class PushExecution:
         return PathPush(scene, push.target, path, pusher).command
 
     def _push(self, scene: PushScene, held: float) -> Twist | ExecutionEnd:
-        push, time = self.push, scene.world.time
+        push = self.push
+        time = scene.world.time
         left = np.isin(scene.movables.ids, push.delivers) & ~scene.done
         if not push.relocates and not left.any():
             return ExecutionEnd.DONE
@@ -262,7 +275,8 @@ class PushExecution:
         if push.controller == "arc":
             return self._pusher(scene, held) or ExecutionEnd.DONE
         self._driven += (time - self._sent_at) * self._speed
-        self._sent_at, self._speed = time, 0.0
+        self._sent_at = time
+        self._speed = 0.0
         longest = push.length if push.relocates else 1.1 * push.length + 0.4 * scene.size
         if self._driven > longest - 1e-6:
             return ExecutionEnd.DONE if push.relocates else ExecutionEnd.FAILED

@@ -67,9 +67,12 @@ def reduce_to_gtsp(costs: FloatArray, masks: list[int], objects: int) -> GtspRed
         masks: what each push delivers, one bit an object.
         objects: how many objects there are.
     """
-    firsts, lasts, chains = [], [], []
+    firsts = []
+    lasts = []
+    chains = []
     clusters: list[list[int]] = [[] for _ in range(objects)]
-    owners, count = [-1], 1
+    owners = [-1]
+    count = 1
     for n, mask in enumerate(masks):
         if not np.isfinite(costs[:, n]).any():
             continue
@@ -214,7 +217,9 @@ def sequence_pushes(graph: PushGraph, simulated_cost: SimulatedCost, most: int) 
     best, following = cost_to_go(graph.costs, graph.masks, count)
     rest = np.array([best[graph.masks[n], n] for n in range(len(graph.masks))])
     guess = graph.costs[-1] + rest
-    chosen, value, mask = -1, math.inf, 0
+    chosen = -1
+    value = math.inf
+    mask = 0
     for n in np.argsort(guess, kind="stable").tolist()[:most]:
         if guess[n] >= value:
             break
@@ -225,7 +230,9 @@ def sequence_pushes(graph: PushGraph, simulated_cost: SimulatedCost, most: int) 
         after = graph.mask(delivers) | int(graph.masks[n])
         total = cost + float(best[after, n])
         if total < value:
-            chosen, value, mask = n, total, after
+            chosen = n
+            value = total
+            mask = after
     return _order_after(following, graph.masks, mask, chosen, [chosen]) if chosen >= 0 else []
 
 

@@ -21,11 +21,14 @@ def pose_behind_outline(
     distance: float,  # of the robot's middle from the outline [m]
 ) -> FloatArray:
     """(3,) pose of a robot that touches an outline from behind and faces along a heading."""
-    c, s = math.cos(heading), math.sin(heading)
-    cos, sin = math.cos(pose[2]), math.sin(pose[2])
+    c = math.cos(heading)
+    s = math.sin(heading)
+    cos = math.cos(pose[2])
+    sin = math.sin(pose[2])
     depth = -np.inf
     for i in range(outline.shape[0]):
-        x, y = outline[i, 0], outline[i, 1]
+        x = outline[i, 0]
+        y = outline[i, 1]
         depth = max(depth, -((cos * x - sin * y) * c + (sin * x + cos * y) * s))
     depth += distance
     return np.array([pose[0] - depth * c - shift * s, pose[1] - depth * s + shift * c, heading])
@@ -43,9 +46,11 @@ def pushable_moves(
     """(16, rows, cols) whether the robot fits behind an object to push it along each heading."""
     rows, cols = is_open.shape
     out = np.zeros((HEADINGS.shape[0], rows, cols), dtype=np.bool_)
-    pose, scratch = np.empty(3), np.empty_like(shape.vertices)
+    pose = np.empty(3)
+    scratch = np.empty_like(shape.vertices)
     for t in range(HEADINGS.shape[0]):
-        c, s = math.cos(HEADINGS[t]), math.sin(HEADINGS[t])
+        c = math.cos(HEADINGS[t])
+        s = math.sin(HEADINGS[t])
         pose[2] = HEADINGS[t]
         for i in range(rows):
             for j in range(cols):

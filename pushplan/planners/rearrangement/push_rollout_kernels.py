@@ -62,8 +62,10 @@ class _Memory(NamedTuple):
 @kernel
 def _enclose(box: FloatArray, pose: FloatArray, reach: float) -> None:
     """Make a box big enough for a disc."""
-    box[0], box[1] = min(box[0], pose[0] - reach), min(box[1], pose[1] - reach)
-    box[2], box[3] = max(box[2], pose[0] + reach), max(box[3], pose[1] + reach)
+    box[0] = min(box[0], pose[0] - reach)
+    box[1] = min(box[1], pose[1] - reach)
+    box[2] = max(box[2], pose[0] + reach)
+    box[3] = max(box[3], pose[1] + reach)
 
 
 @kernel
@@ -78,7 +80,10 @@ def _write(log: RolloutLog, stages: int, used: int, poses: FloatArray, lengths: 
 @kernel
 def _update_done(memory: _Memory, problem: PushRollout, box: FloatArray, margin: float) -> bool:
     """Remove what is delivered after a step; returns whether one more object is done."""
-    poses, saved, done, news = memory.poses, memory.saved, memory.done, False
+    poses = memory.poses
+    saved = memory.saved
+    done = memory.done
+    news = False
     for k in range(poses.shape[0]):
         if poses[k, 0] != saved[k, 0] or poses[k, 1] != saved[k, 1]:
             _enclose(box, poses[k], problem.bodies.radii[k] + margin)
@@ -122,14 +127,23 @@ def roll_out(
 def _roll(memory: _Memory, problem: PushRollout, log: RolloutLog) -> tuple[int, int]:
     """`roll_out` in memory that is given; the last stage is kept however it ends."""
     here, there, poses, saved, lengths, done, scratch = memory
-    controller, bodies = problem.controller, problem.bodies
+    controller = problem.controller
+    bodies = problem.bodies
     copy_into(log.track[0], here)
     margin = 2.0 * controller.step
-    log.box[0], log.box[1], log.box[2], log.box[3] = np.inf, np.inf, -np.inf, -np.inf
+    log.box[0] = np.inf
+    log.box[1] = np.inf
+    log.box[2] = -np.inf
+    log.box[3] = -np.inf
     _enclose(log.box, here, bodies.robot_radius + margin)
-    stages, used, travelled, reached = 0, 1, 0.0, 0.0
+    stages = 0
+    used = 1
+    travelled = 0.0
+    reached = 0.0
     while used < log.track.shape[0] and travelled < problem.limit:
-        step, turn, target = controller.step, 0.0, problem.target
+        step = controller.step
+        turn = 0.0
+        target = problem.target
         if target >= 0:
             step, turn, reached, holds = steer_push(
                 here, poses[target], problem.path, reached, problem.shift, controller

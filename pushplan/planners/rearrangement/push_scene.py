@@ -102,8 +102,11 @@ class SearchBudget:
 
     def __init__(self, stop: Stop | None = None, most: float = math.inf) -> None:
         self._check = None if stop is None else stop.start()
-        self._most, self._over = most, False
-        self.used, self.cost, self.interrupted = 0, math.inf, False
+        self._most = most
+        self._over = False
+        self.used = 0
+        self.cost = math.inf
+        self.interrupted = False
 
     @property
     def is_over(self) -> bool:
@@ -133,7 +136,8 @@ def make_pose_grid(robot: RobotModel, static: StaticMap, step: float, margin: fl
         margin: distance to keep from what is static [m].
     """
     x0, y0, x1, y1 = static.bounds.tolist()
-    cols, rows = int((x1 - x0) / step) + 1, int((y1 - y0) / step) + 1
+    cols = int((x1 - x0) / step) + 1
+    rows = int((y1 - y0) / step) + 1
     grid = PoseGrid(
         x0 + 0.5 * ((x1 - x0) - (cols - 1) * step),
         y0 + 0.5 * ((y1 - y0) - (rows - 1) * step),
@@ -172,7 +176,8 @@ def make_object_goal(goal: Goal, static: StaticMap, slack: float) -> ObjectGoal:
 
 def heading_axes(heading: float) -> tuple[FloatArray, FloatArray]:
     """Unit vectors (2,) along a heading [rad] and to the left of it."""
-    c, s = math.cos(heading), math.sin(heading)
+    c = math.cos(heading)
+    s = math.sin(heading)
     return np.array([c, s]), np.array([-s, c])
 
 
@@ -355,7 +360,9 @@ class PushScene:
 
     def _contact_grid(self, cell: float, margin: float, part: float = 1.0) -> ContactGrid:
         """A lattice of a part of a cell that is not too small for the map."""
-        robot, static, away = self.world.robot, self.world.static, margin * self.size
+        robot = self.world.robot
+        static = self.world.static
+        away = margin * self.size
         sides = static.bounds[2:] - static.bounds[:2]
         side = max(cell, _LEAST_CELL * float(sides.max()) / self.size) * self.size
         grid = make_pose_grid(robot, static, part * side, away)
@@ -365,7 +372,8 @@ class PushScene:
     @cached_property
     def route_problem(self) -> RouteProblem:
         """The costs of legs and turns on the way to a push."""
-        robot, margin = self.world.robot, MARGIN * self.size
+        robot = self.world.robot
+        margin = MARGIN * self.size
         return RouteProblem(
             step=0.1 * self.size,
             turn_cost=self.turn_cost,
@@ -443,7 +451,8 @@ class PushScene:
             heading: [rad].
             shift: how far the robot's middle is to the left of the object [m].
         """
-        outline, distance = self.movables.outline(k), self.front + _SLACK * self.size
+        outline = self.movables.outline(k)
+        distance = self.front + _SLACK * self.size
         return pose_behind_outline(np.array(self.poses[k]), outline, heading, shift, distance)
 
     @cached_property
@@ -457,7 +466,8 @@ class PushScene:
 
     def is_clear(self, pose: FloatArray) -> bool:
         """Whether the robot at a pose (3,) overlaps no object."""
-        movables, robot = self.movables, self.world.robot
+        movables = self.movables
+        robot = self.world.robot
         away = np.hypot(*(self.poses[:, :2] - pose[:2]).T)
         for k in np.flatnonzero(away < self.size + movables.radii).tolist():
             outline = np.ascontiguousarray(movables.outline_world(k))

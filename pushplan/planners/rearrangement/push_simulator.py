@@ -68,7 +68,8 @@ def simulate(
         poses: (K, 3) where the objects are when the push begins; where they are now by default.
         spent: (K,) path lengths that getting there has cost them [m].
     """
-    rollout, follows_path = _roll_out(scene, attempt, poses), len(attempt.path) > 0
+    rollout = _roll_out(scene, attempt, poses)
+    follows_path = len(attempt.path) > 0
     found = []
     for s in range(len(rollout.steps))[-1 if attempt.relocates else 0 :]:
         done = all_done(rollout.poses[s], scene.bodies, scene.object_goal)
@@ -106,7 +107,9 @@ def end_of(scene: PushScene, attempt: PushAttempt) -> FloatArray:
 
 def _roll_out(scene: PushScene, attempt: PushAttempt, poses: FloatArray | None) -> Rollout:
     """Roll out a push, unless it is known what comes of it."""
-    movables, settings, count = scene.movables, scene.settings, len(scene.poses)
+    movables = scene.movables
+    settings = scene.settings
+    count = len(scene.poses)
     wanted = np.zeros(count, dtype=np.bool_)
     wanted[list(attempt.wanted) or [attempt.target]] = True
     if attempt.friction is not None:
@@ -214,7 +217,8 @@ def _push(
     effort = float(scene.weights @ lengths)
     moved = np.flatnonzero((lengths > 1e-9) & ~done)
     if len(moved):
-        now, then = scene.remaining_now[moved], scene.remaining(after[moved])
+        now = scene.remaining_now[moved]
+        then = scene.remaining(after[moved])
         known = np.isfinite(now) & np.isfinite(then)
         change = np.full(len(moved), scene.longest)
         change[known] = then[known] - now[known]
@@ -247,7 +251,8 @@ def resimulate(
         poses: see `simulate`.
         spent: see `simulate`.
     """
-    ids, target = scene.movables.ids, scene.index_of(push.target)
+    ids = scene.movables.ids
+    target = scene.index_of(push.target)
     if push.controller == "arc":
         path = np.vstack([start, push.poses[1:]])
         path[:, 2] = np.unwrap(path[:, 2])
@@ -268,7 +273,9 @@ def resimulate(
         return ends
     if len(push.object_poses) != len(scene.poses):
         return []  # planned among other objects
-    size, there, near = scene.size, push.object_poses[target], _ALIKE
+    size = scene.size
+    there = push.object_poses[target]
+    near = _ALIKE
     if push.controller != "arc":
         now = (scene.poses if poses is None else poses)[target]
         near = max(near, 0.5 * pose_distance(now, there, size))

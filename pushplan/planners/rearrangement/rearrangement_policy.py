@@ -81,7 +81,8 @@ def warm_up_rearrangement() -> None:
 @functools.cache
 def warm_up_steering() -> None:
     """Steer a push outside rollouts, as `GeometricPusher` does; few episodes come to that."""
-    here, scene = np.zeros(3), _small_scene()
+    here = np.zeros(3)
+    scene = _small_scene()
     steer_push(here, here, np.eye(2), 0.0, 0.0, scene.controller)
 
 
@@ -91,7 +92,8 @@ def _drive_in_small_worlds(policy: Callable[[], RearrangementPolicy]) -> None:
     for world in warm_up_worlds("rearrangement"):
         driven = policy()
         for _ in range(_STEPS):
-            twist, pose = driven.act(world), np.empty(3)
+            twist = driven.act(world)
+            pose = np.empty(3)
             # nothing is in the robot's way
             here = np.array(world.robot_pose)
             arc_step(here, _PERIOD * twist.linear, _PERIOD * twist.angular, pose)

@@ -43,7 +43,9 @@ _LITTLE = 0.25  # part of the gain that helps too where nothing else does
 _STARTS = 300
 """From so many places round the object a drive may begin, besides those of the table."""
 _DRAWS = 10  # so many places are looked at for each of them
-_PLACE, _TURN = 0.2, 0.5  # sides of a box of like poses of the object [circumscribed radii, rad]
+# sides of a box of like poses of the object [circumscribed radii, rad]
+_PLACE = 0.2
+_TURN = 0.5
 _SPREAD = np.array([0.8191725134, 0.6710436067, 0.5497004779])
 """Steps of an additive recurrence that fills a cube evenly (Roberts 2018)."""
 _MOST_ALIKE = 3  # so many states with the object in the same place are driven on from
@@ -70,7 +72,9 @@ def relocating_pushes(
         approach: from where the robot is.
         thorough: whether to look for drives that cost much more than the best one too.
     """
-    movables, cache, found = scene.movables, scene.cache, None
+    movables = scene.movables
+    cache = scene.cache
+    found = None
     near = np.hypot(*(scene.poses[:, :2] - scene.poses[k, :2]).T) < _NEAR * scene.size
     asked = Asked(
         movables.ids[near].tobytes() + scene.poses[near].tobytes(), scene.robot_cell, thorough
@@ -135,12 +139,16 @@ class _RelocationSearch:
     def __init__(
         self, scene: PushScene, k: int, approach: ApproachTree, thorough: bool = False
     ) -> None:
-        self._scene, self._k, self._approach = scene, k, approach
-        self._config, self._thorough = scene.config.relocation, thorough
+        self._scene = scene
+        self._k = k
+        self._approach = approach
+        self._config = scene.config.relocation
+        self._thorough = thorough
         self._slack = math.inf if thorough else _DEARER * scene.size
         self._horizon = _HORIZON * scene.size
         self._cost_to_go = scene.push_cost_to_go(k)
-        step, turn = scene.controller.step, scene.controller.turn
+        step = scene.controller.step
+        turn = scene.controller.turn
         signs = (1.0, -1.0) if scene.world.robot.min_speed != 0.0 else (1.0,)
         arcs = [
             (sign * step, curvature * step / scene.size)
@@ -159,7 +167,9 @@ class _RelocationSearch:
 
     def run(self) -> list[Primitive]:
         """Drives, each with the cost of what it leaves to be done [m]."""
-        scene, k, config = self._scene, self._k, self._config
+        scene = self._scene
+        k = self._k
+        config = self._config
         if can_be_pushed(scene, k, self._horizon):  # but not all the way
             self._horizon = scene.longest
         now = float(self._rest(scene.poses[[k]])[0])
@@ -168,8 +178,11 @@ class _RelocationSearch:
             away = float((self._approach.costs[nodes] + extra).min()) if len(nodes) else math.inf
             if math.isfinite(away):
                 self._put(_State(None, start[None], scene.poses, 0, away, now))
-        most, best = len(config.margins), math.inf
-        expansions, sides, alike = 0, Counter[_Cell](), Counter[_Cell]()
+        most = len(config.margins)
+        best = math.inf
+        expansions = 0
+        sides = Counter[_Cell]()
+        alike = Counter[_Cell]()
         while self._open and expansions < config.expansions and sides.total() < _ENOUGH:
             if scene.budget.is_over:
                 break
@@ -184,7 +197,8 @@ class _RelocationSearch:
             if state.depth:
                 if pose_distance(state.poses[k], scene.poses[k], scene.size) < _LEAST_MOVE:
                     continue
-                side, place = self._side(state), self._place(state)
+                side = self._side(state)
+                place = self._place(state)
                 if sides[side] < most and place not in self._failing:
                     self._failing[place] = self._failing_margins(state)
                 stands = most - self._failing.get(place, most)
@@ -248,9 +262,11 @@ class _RelocationSearch:
 
     def _expand(self, state: _State) -> None:
         """Drive on from a state along every arc; each place that the object gets to is a state."""
-        scene, k = self._scene, self._k
+        scene = self._scene
+        k = self._k
         # copies may be written to: one kernel for all
-        start, before = np.array(state.track[-1]), np.array(state.poses)
+        start = np.array(state.track[-1])
+        before = np.array(state.poses)
         tracks, poses, marks = sweep_arcs(
             start,
             before,
@@ -299,7 +315,9 @@ class _RelocationSearch:
 
     def _delivers(self, state: _State, by: FloatArray) -> bool:
         """Whether a push gets the object home from where it is in a state, moved by an error."""
-        scene, k, poses = self._scene, self._k, np.array(state.poses)
+        scene = self._scene
+        k = self._k
+        poses = np.array(state.poses)
         if poses[k, 0] < 0.5 * REMOVED:
             poses[k] += by * np.array([scene.size, scene.size, 1.0])
         after = scene.with_objects_at(poses)
@@ -320,7 +338,8 @@ class _RelocationSearch:
 
     def _behind(self) -> Iterator[FloatArray]:
         """Poses (3,) behind and beside the object, by the rows of arcs of the table."""
-        scene, k = self._scene, self._k
+        scene = self._scene
+        k = self._k
         path = scene.object_path(k, 0.0)
         if path is None:
             return
@@ -336,11 +355,14 @@ class _RelocationSearch:
     def _around(self) -> Iterator[FloatArray]:
         """Poses (3,) round the object that touch nothing, evenly spread."""
         scene = self._scene
-        box, radius = scene.poses[self._k], float(scene.movables.radii[self._k])
+        box = scene.poses[self._k]
+        radius = float(scene.movables.radii[self._k])
         fraction = np.mod(0.5 + np.outer(np.arange(1, _DRAWS * _STARTS + 1), _SPREAD), 1.0)
         away = 0.3 * radius + scene.size * (0.2 + 1.1 * fraction[:, 0])
-        bearing, heading = 2.0 * np.pi * fraction[:, 1], 2.0 * np.pi * fraction[:, 2] - np.pi
-        x, y = box[0] + away * np.cos(bearing), box[1] + away * np.sin(bearing)
+        bearing = 2.0 * np.pi * fraction[:, 1]
+        heading = 2.0 * np.pi * fraction[:, 2] - np.pi
+        x = box[0] + away * np.cos(bearing)
+        y = box[1] + away * np.sin(bearing)
         poses = np.column_stack([x, y, heading])
         free = (pose for pose in poses if scene.fits(pose) and scene.is_clear(pose))
         return itertools.islice(free, _STARTS)

@@ -111,10 +111,12 @@ class RolloutCache:
         if (poses[near] != entry.before).any():
             return None
         entry.age = 0
-        old, moved = entry.rollout, near[entry.moved]
+        old = entry.rollout
+        moved = near[entry.moved]
         after = np.repeat(poses[None], len(old.steps), axis=0)
         lengths = np.zeros(after.shape[:2])
-        after[:, moved], lengths[:, moved] = old.poses, old.lengths
+        after[:, moved] = old.poses
+        lengths[:, moved] = old.lengths
         gone = after[:, :, 0] >= 0.5 * REMOVED
         after[:, :, 0] = np.where(gone, REMOVED * (1.0 + np.arange(len(poses))), after[:, :, 0])
         return Rollout(old.track, old.steps, after, lengths)
@@ -143,7 +145,8 @@ class RolloutCache:
 
 def _within(box: FloatArray, poses: FloatArray, radii: FloatArray) -> BoolArray:
     """(K,) which objects reach into a box."""
-    places, reach = poses[:, :2], radii[:, None]
+    places = poses[:, :2]
+    reach = radii[:, None]
     inside = (places + reach > box[:2]) & (places - reach < box[2:])  # (K, 2)
     return inside[:, 0] & inside[:, 1]
 
@@ -156,6 +159,7 @@ def _grown(box: FloatArray, poses: FloatArray, radii: FloatArray) -> BoolArray:
         if (now == within).all():
             return within
         within = now
-        places, reach = poses[within, :2], 1.1 * radii[within, None]
+        places = poses[within, :2]
+        reach = 1.1 * radii[within, None]
         box[:2] = np.minimum(box[:2], (places - reach).min(axis=0))
         box[2:] = np.maximum(box[2:], (places + reach).max(axis=0))

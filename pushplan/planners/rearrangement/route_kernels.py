@@ -39,17 +39,23 @@ class RouteProblem(NamedTuple):
 @kernel(allocates=True)
 def _object_depth(pose: FloatArray, problem: RouteProblem, body: FloatArray) -> tuple[float, float]:
     """How deep the footprint is in the objects [m], and the weights of those it is in."""
-    shape, poses, bodies = problem.shape, problem.poses, problem.bodies
-    total, touch, placed = 0.0, 0.0, False
+    shape = problem.shape
+    poses = problem.poses
+    bodies = problem.bodies
+    total = 0.0
+    touch = 0.0
+    placed = False
     for k in range(poses.shape[0]):
-        dx, dy = poses[k, 0] - pose[0], poses[k, 1] - pose[1]
+        dx = poses[k, 0] - pose[0]
+        dy = poses[k, 1] - pose[1]
         reach = shape.radius + bodies.radii[k]
         if problem.weights[k] == 0.0 or dx * dx + dy * dy >= reach * reach:
             continue
         if not placed:
             transform_points(pose, shape.vertices, body)
             placed = True
-        a, b = bodies.offsets[k], bodies.offsets[k + 1]
+        a = bodies.offsets[k]
+        b = bodies.offsets[k + 1]
         outline = np.empty((b - a, 2))
         transform_points(poses[k], bodies.vertices[a:b], outline)
         deepest = 0.0
@@ -67,14 +73,16 @@ def _turn(
     x: float, y: float, heading: float, to: float, problem: RouteProblem
 ) -> tuple[float, float]:
     """Cost of a turn on the spot from one heading to another, and how to make it; see `Route`."""
-    here, there = np.array([x, y, heading]), np.array([x, y, to])
+    here = np.array([x, y, heading])
+    there = np.array([x, y, to])
     turn = wrap_angle(to - heading)
     other = turn - math.copysign(2.0 * math.pi, turn)
     cost = _motion(here, there, turn, problem)
     if abs(turn) > LITTLE_TURN and problem.turn_cost * abs(other) < cost:
         longer = _motion(here, there, other, problem)
         if longer < cost:
-            cost, turn = longer, other
+            cost = longer
+            turn = other
     return cost, math.copysign(1.0, turn) if abs(turn) > SURE_TURN else 0.0
 
 
@@ -96,7 +104,8 @@ def _motion(here: FloatArray, there: FloatArray, turn: float, problem: RouteProb
         pose[1] = here[1] + part * (there[1] - here[1])
         pose[2] = here[2] + part * turn
         if inside > 0.0:  # out of it, but no deeper into it
-            before, inside = inside, static_depth(pose, problem.tight, problem.among, scratch)
+            before = inside
+            inside = static_depth(pose, problem.tight, problem.among, scratch)
             if inside > before:
                 return np.inf
             cost += _TIGHT_COST * (length + problem.shape.radius * abs(turn)) / steps
@@ -115,13 +124,15 @@ def _leg(
     x: float, y: float, heading: float, point: FloatArray, sign: float, problem: RouteProblem
 ) -> tuple[float, float, float]:
     """Cost of turning to a point (2,) and driving there, the heading then, and how to turn."""
-    dx, dy = point[0] - x, point[1] - y
+    dx = point[0] - x
+    dy = point[1] - y
     if math.hypot(dx, dy) < 1e-9:
         return 0.0, heading, 0.0
     ahead = math.atan2(sign * dy, sign * dx)
     cost, turn = _turn(x, y, heading, ahead, problem)
     if cost < np.inf:
-        here, there = np.array([x, y, ahead]), np.array([point[0], point[1], ahead])
+        here = np.array([x, y, ahead])
+        there = np.array([point[0], point[1], ahead])
         cost += _motion(here, there, 0.0, problem)
     return cost, ahead, turn
 
@@ -137,25 +148,35 @@ def cheapest_legs(
 ) -> tuple[FloatArray, IntArray, FloatArray]:
     """Costs of ending ahead and back; the row before each row (2 i, 2 i + 1); turns (2 N, 2)."""
     count = points.shape[0]
-    best, came = np.empty(2 * count), np.empty(2 * count, dtype=np.int64)
-    headings, turns = np.empty(2 * count), np.zeros((2 * count, 2))
-    best[:], came[:], headings[:] = np.inf, -1, heading
+    best = np.empty(2 * count)
+    came = np.empty(2 * count, dtype=np.int64)
+    headings = np.empty(2 * count)
+    turns = np.zeros((2 * count, 2))
+    best[:] = np.inf
+    came[:] = -1
+    headings[:] = heading
     best[0] = 0.0
     for to in range(2, 2 * count):
-        j, sign = to // 2, 1.0 - 2.0 * (to % 2)
+        j = to // 2
+        sign = 1.0 - 2.0 * (to % 2)
         for at in range(2 * j):
             i = at // 2
             if i >= first and i < j - longest:
                 continue
-            x, y = points[i, 0], points[i, 1]
+            x = points[i, 0]
+            y = points[i, 1]
             if best[at] + math.hypot(x - points[j, 0], y - points[j, 1]) >= best[to]:
                 continue
             cost, ahead, turn = _leg(x, y, headings[at], points[j], sign, problem)
-            cost, last = best[at] + cost, 0.0
+            cost = best[at] + cost
+            last = 0.0
             if j == count - 1 and cost < best[to]:
                 more, last = _turn(points[j, 0], points[j, 1], ahead, end, problem)
                 cost += more
             if cost < best[to]:
-                best[to], came[to], headings[to] = cost, at, ahead
-                turns[to, 0], turns[to, 1] = turn, last
+                best[to] = cost
+                came[to] = at
+                headings[to] = ahead
+                turns[to, 0] = turn
+                turns[to, 1] = last
     return best[-2:], came, turns

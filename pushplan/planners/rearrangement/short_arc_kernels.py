@@ -67,12 +67,16 @@ def sweep_arcs(
         copy_into(out[a, 0], poses)
         last = 0
         for n in range(1, count + 1):
-            here, there, after = tracks[a, n - 1], tracks[a, n], out[a, n]
+            here = tracks[a, n - 1]
+            there = tracks[a, n]
+            after = out[a, n]
             arc_step(here, arcs[a, 0], arcs[a, 1], there)
             copy_into(after, out[a, n - 1])
             if not push_to(here, there, after, lengths, bodies, settings, scratch):
                 break
             if _has_moved(out[a, last, target], after[target], size, least):
-                marks[found, 0], marks[found, 1], last = a, n, n
+                marks[found, 0] = a
+                marks[found, 1] = n
+                last = n
                 found += 1
     return tracks, out, marks[:found]

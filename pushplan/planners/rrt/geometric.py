@@ -78,7 +78,8 @@ class GeometricRRT:
             return call.result(PlanStatus.GOAL_UNREACHABLE)
         start = owned(world.robot_pose[:2])
         size = world.robot.circumscribed_radius
-        wide, narrow = config.clearance * size, world.robot.inscribed_radius
+        wide = config.clearance * size
+        narrow = world.robot.inscribed_radius
         passes = [(boxes, wide), ([], wide), ([], min(size, wide)), ([], min(narrow, wide))]
         for blocked, radius in passes:
             among = obstacles(keep_out(world), blocked)
@@ -98,7 +99,10 @@ class GeometricRRT:
         self, call: PlanningCall, among: ConvexObstacles, radius: float, before: int
     ) -> tuple[FloatArray | None, int]:
         """One pass: the corners of a path, or None, and the samples that it took."""
-        config, world, check, rng = self.config, call.world, call.check, call.rng
+        config = self.config
+        world = call.world
+        check = call.check
+        rng = call.rng
         used = 0
 
         def done() -> bool:
@@ -117,7 +121,8 @@ class GeometricRRT:
             point = np.empty(2)
 
             def valid(state: base.State) -> bool:
-                point[0], point[1] = state[0], state[1]
+                point[0] = state[0]
+                point[1] = state[1]
                 return bool(space.satisfiesBounds(state)) and not _near(point, among, radius)
 
             info.setStateValidityChecker(valid)
@@ -127,7 +132,8 @@ class GeometricRRT:
             info.setup()
             problem = base.ProblemDefinition(info)
             start = own_state(_plane)
-            start[0], start[1] = float(world.robot_pose[0]), float(world.robot_pose[1])
+            start[0] = float(world.robot_pose[0])
+            start[1] = float(world.robot_pose[1])
             problem.addStartState(start)
             region = _GoalRegion(info, world.navigation_goal, among.bounds, rng)
             problem.setGoal(region)
@@ -158,11 +164,14 @@ class _GoalRegion(base.GoalSampleableRegion):
         rng: np.random.Generator,
     ) -> None:
         super().__init__(info)
-        self.goal, self.bounds, self.rng = goal, bounds, rng
+        self.goal = goal
+        self.bounds = bounds
+        self.rng = rng
         self.setThreshold(np.finfo(np.float64).tiny)  # only a distance of 0 is below
 
     def sampleGoal(self, state: base.State) -> None:
-        low, high = self.bounds[:2], self.bounds[2:]
+        low = self.bounds[:2]
+        high = self.bounds[2:]
         point = low + self.rng.random(2) * (high - low)
         for _ in range(30):
             candidate = low + self.rng.random(2) * (high - low)
@@ -171,7 +180,8 @@ class _GoalRegion(base.GoalSampleableRegion):
                 break
         else:
             point = np.clip(getattr(self.goal, "center", point), low, high)
-        state[0], state[1] = float(point[0]), float(point[1])
+        state[0] = float(point[0])
+        state[1] = float(point[1])
 
     def maxSampleCount(self) -> int:
         return 1_000_000_000
@@ -183,12 +193,14 @@ class _GoalRegion(base.GoalSampleableRegion):
 @kernel(allocates=True)
 def _near(point: FloatArray, among: ConvexObstacles, radius: float) -> bool:
     """Whether a disc about ``point`` (2,) touches an obstacle."""
-    x, y = point[0], point[1]
+    x = point[0]
+    y = point[1]
     for s in range(among.boxes.shape[0]):
         box = among.boxes[s]
         if x + radius < box[0] or x - radius > box[2] or y + radius < box[1] or y - radius > box[3]:
             continue
-        first, last = among.offsets[s], among.offsets[s + 1]
+        first = among.offsets[s]
+        last = among.offsets[s + 1]
         if core_distance(x, y, among.vertices, first, last) < radius:
             return True
     return False

@@ -18,7 +18,8 @@ def floe_costs(
     cell: float,  # side of a cell of the map [m]
 ) -> FloeCosts:
     """Costs of all floes of a world."""
-    floes, robot = world.movables, world.robot
+    floes = world.movables
+    robot = world.robot
     half = max(robot.inscribed_radius, 0.1 * robot.circumscribed_radius)
     areas = areas_and_centroids(floes.vertices, floes.offsets)[0]
     radii = np.sqrt(areas / np.pi)

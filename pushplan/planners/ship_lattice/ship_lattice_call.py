@@ -47,7 +47,9 @@ class ShipLatticeCall:
         config: ShipLatticeConfig,
         interaction: InteractionModel | None,
     ) -> None:
-        self.call, self.config, self.interaction = call, config, interaction
+        self.call = call
+        self.config = config
+        self.interaction = interaction
         self.world = world = call.world
         check_turns(world.robot)
         self.goal = world.navigation_goal
@@ -72,13 +74,15 @@ class ShipLatticeCall:
 
     def _run(self) -> PlanStatus | None:
         world = self.world
-        shape, walls = footprint(world.robot), obstacles(keep_out(world))
+        shape = footprint(world.robot)
+        walls = obstacles(keep_out(world))
         if not is_free(owned(world.robot_pose), shape, walls, np.empty_like(shape.vertices)):
             return PlanStatus.START_BLOCKED
         if goal_is_outside(world):
             return PlanStatus.GOAL_UNREACHABLE
         if self.goal.distance(*(float(v) for v in world.robot_pose[:2])) <= 0.0:
-            self.poses, self.curvatures = world.robot_pose[None].copy(), np.zeros(1)
+            self.poses = world.robot_pose[None].copy()
+            self.curvatures = np.zeros(1)
             self.first_solution_s = self.call.elapsed
             return PlanStatus.SOLVED
         for fraction, side in self._limits():
@@ -146,9 +150,11 @@ class ShipLatticeCall:
         if not self._free(poses):
             return False
         if self.built is None:
-            self.built, self.lattice_cost = built, star.cost
+            self.built = built
+            self.lattice_cost = star.cost
             self.first_solution_s = self.call.elapsed
-            self.poses, self.curvatures = poses, curvatures
+            self.poses = poses
+            self.curvatures = curvatures
             self.cost = self.world.robot.mass * star.cost
         else:
             self._consider(poses, curvatures)
@@ -157,13 +163,16 @@ class ShipLatticeCall:
     def _free(self, poses: FloatArray) -> bool:
         """Whether a path keeps clear of walls, and its origin from the bounds but those ahead."""
         world = self.world
-        low, high = world.static.bounds[:2] + self.side, world.static.bounds[2:] - self.side
+        low = world.static.bounds[:2] + self.side
+        high = world.static.bounds[2:] - self.side
         if isinstance(self.goal, GoalLine):
             high = np.where(self.goal.normal > 0.7, world.static.bounds[2:], high)
             low = np.where(self.goal.normal < -0.7, world.static.bounds[:2], low)
         start = world.robot_pose[:2]
-        low, high = np.minimum(low, start), np.maximum(high, start)
-        shape, walls = footprint(world.robot), obstacles(keep_out(world))
+        low = np.minimum(low, start)
+        high = np.maximum(high, start)
+        shape = footprint(world.robot)
+        walls = obstacles(keep_out(world))
         walls = walls._replace(
             bounds=np.concatenate([low - 1e-6 * self.size, high + 1e-6 * self.size])
         )
@@ -172,7 +181,8 @@ class ShipLatticeCall:
 
     def _improve(self, builder: LatticeBuilder) -> None:
         """Sweep the path, look at others, and change the best at random."""
-        config, world = self.config, self.world
+        config = self.config
+        world = self.world
         assert self.built is not None
         point, normal = self.built.finish(world)
         ahead = config.sweep_horizon * self.size

@@ -88,7 +88,8 @@ class ShipPathImprover:
         best = self.best
         count = len(best.poses)
         part = count if len(best.objects) >= count else len(best.objects)
-        out, curvatures = np.empty((2 * part + 60, 3)), np.zeros(2 * part + 60)
+        out = np.empty((2 * part + 60, 3))
+        curvatures = np.zeros(2 * part + 60)
         # where only a part is swept, its end is not the end of the path
         problem = self.problem if part == count else self.problem._replace(end_fraction=0.0)
         first, new, size = propose(

@@ -30,25 +30,33 @@ def steer_on(
 ) -> int:
     """Drive on in small arcs of least cost to go; the number of poses, 0 where they do not fit."""
     goal = costs.low + (costs.table.shape[0] - 1) * costs.row
-    x, y, theta = pose[0], pose[1], pose[2]
+    x = pose[0]
+    y = pose[1]
+    theta = pose[2]
     for n in range(out.shape[0]):
         if y >= goal:
             return n
-        best, chosen = np.inf, 0
+        best = np.inf
+        chosen = 0
         for b in range(curvatures.shape[0]):
             middle = theta + 0.5 * curvatures[b] * step
-            nx, ny = x + step * math.cos(middle), y + step * math.sin(middle)
+            nx = x + step * math.cos(middle)
+            ny = y + step * math.sin(middle)
             heading = theta + curvatures[b] * step
             cost = step * (costs.mass + costs.weight * mass_ahead(costs, nx, ny, heading))
             cost += cost_to_go(costs, nx, ny, heading)
             cost += 1e-7 * costs.mass * step * abs(curvatures[b]) * costs.radius  # a tie-break
             if cost < best:
-                best, chosen = cost, b
+                best = cost
+                chosen = b
         middle = theta + 0.5 * curvatures[chosen] * step
         x += step * math.cos(middle)
         y += step * math.sin(middle)
         theta += curvatures[chosen] * step
-        out[n, 0], out[n, 1], out[n, 2], out[n, 3] = x, y, theta, curvatures[chosen]
+        out[n, 0] = x
+        out[n, 1] = y
+        out[n, 2] = theta
+        out[n, 3] = curvatures[chosen]
     return out.shape[0] if y >= goal else 0
 
 
@@ -61,19 +69,24 @@ def arc_ahead(
     count: int,  # how many there are after the first
 ) -> FloatArray:
     """(N, 4) an arc from a pose on, cut off at the goal; (0, 4) where it leaves the channel."""
-    low, high = channel.low, channel.high
+    low = channel.low
+    high = channel.high
     arc = np.empty((count + 1, 4))
-    arc[0, 0], arc[0, 1], arc[0, 2], arc[0, 3] = pose[0], pose[1], pose[2], curvature
+    arc[0, 0] = pose[0]
+    arc[0, 1] = pose[1]
+    arc[0, 2] = pose[2]
+    arc[0, 3] = curvature
     for n in range(1, count + 1):
         half = 0.5 * curvature * step * n
         chord = step * n * (math.sin(half) / half if half != 0.0 else 1.0)
-        x, y = (
-            pose[0] + chord * math.cos(pose[2] + half),
-            pose[1] + chord * math.sin(pose[2] + half),
-        )
+        x = pose[0] + chord * math.cos(pose[2] + half)
+        y = pose[1] + chord * math.sin(pose[2] + half)
         if x < low[0] or x > high[0] or y < low[1] or y > high[1]:
             return arc[:0]
-        arc[n, 0], arc[n, 1], arc[n, 2], arc[n, 3] = x, y, pose[2] + 2.0 * half, curvature
+        arc[n, 0] = x
+        arc[n, 1] = y
+        arc[n, 2] = pose[2] + 2.0 * half
+        arc[n, 3] = curvature
         if y >= channel.goal:
             return arc[: n + 1]
     return arc

@@ -51,7 +51,8 @@ class BeamSearch(Generic[Ice]):
         Returns:
             None where no piece fits, or the stop rule fired before the horizon.
         """
-        layer, finished = [root], None
+        layer = [root]
+        finished = None
         for _ in range(max(1, math.ceil(horizon / (self.config.arc * self.view.length)))):
             children = self._predict(self._candidates(layer, width))
             if self.stopped:
@@ -95,7 +96,8 @@ class BeamSearch(Generic[Ice]):
 
     def _cost(self, length: float, work: float, arc: FloatArray, done: float | None) -> float:
         """Cost up to the end of a piece plus what the costs to go expect of the rest."""
-        view, w = self.view, self.config.push_weight
+        view = self.view
+        w = self.config.push_weight
         step = SPACING * view.length
         ahead = step * (len(arc) - 1)
         mass = view.world.robot.mass
@@ -137,7 +139,8 @@ class BeamSearch(Generic[Ice]):
         """The best of a layer, one for each place and heading."""
         layer.sort(key=lambda node: node.total)
         cell = 0.08 * self.view.length
-        kept, seen = [], set()
+        kept = []
+        seen = set()
         for node in layer:
             place = (
                 round(node.pose[0] / cell),
@@ -157,7 +160,8 @@ class BeamSearch(Generic[Ice]):
         Returns:
             None where that leaves the channel, or the stop rule fired on it.
         """
-        view, w = self.view, self.config.push_weight
+        view = self.view
+        w = self.config.push_weight
         step = SPACING * view.length
         turning = 2.0 * math.pi * view.radius
         most = math.ceil((4.0 * max(view.channel.goal - node.pose[1], 0.0) + turning) / step)

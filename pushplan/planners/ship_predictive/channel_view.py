@@ -46,8 +46,10 @@ class ChannelView:
 
     def to_world(self, poses: FloatArray) -> FloatArray:
         """Carry (..., 3) poses from the frame of the channel to the world's."""
-        c, s = math.cos(self.turn), math.sin(self.turn)
-        x, y = poses[..., 0], poses[..., 1]
+        c = math.cos(self.turn)
+        s = math.sin(self.turn)
+        x = poses[..., 0]
+        y = poses[..., 1]
         x0, y0 = self.world.robot_pose[:2]
         return np.stack(
             [x0 + c * x - s * y, y0 + s * x + c * y, poses[..., 2] + self.turn], axis=-1
@@ -59,7 +61,8 @@ class ChannelView:
         fits = bool((at >= self.channel.low).all() and (at <= self.channel.high).all())
         if not fits or not self.askew:
             return fits
-        at, bounds = self.to_world(poses[:, :3])[:, :2], self.world.static.bounds
+        at = self.to_world(poses[:, :3])[:, :2]
+        bounds = self.world.static.bounds
         slack = 1e-9 * self.length
         return bool((at >= bounds[:2] - slack).all() and (at <= bounds[2:] + slack).all())
 
@@ -98,7 +101,8 @@ def channel_view(world: World, config: PredictiveConfig, model: IceInteraction) 
     aside = 0.5 * max(goal, 0.0) + 5.0 * length  # no path leads farther from the straight one
     low[0], high[0] = max(low[0], min(-aside, high[0])), min(high[0], max(aside, low[0]))
     channel = Channel(goal, low, high)
-    bodies, floes = select_bodies(bodies, near), np.ascontiguousarray(floes[near])
+    bodies = select_bodies(bodies, near)
+    floes = np.ascontiguousarray(floes[near])
     return ChannelView(
         world=world,
         turn=turn,
@@ -117,8 +121,10 @@ def channel_view(world: World, config: PredictiveConfig, model: IceInteraction) 
 
 
 def _from_world(poses: FloatArray, origin: FloatArray, turn: float) -> FloatArray:
-    c, s = math.cos(turn), math.sin(turn)
-    dx, dy = poses[:, 0] - origin[0], poses[:, 1] - origin[1]
+    c = math.cos(turn)
+    s = math.sin(turn)
+    dx = poses[:, 0] - origin[0]
+    dy = poses[:, 1] - origin[1]
     return np.column_stack([c * dx + s * dy, c * dy - s * dx, poses[:, 2] - turn])
 
 
@@ -134,7 +140,8 @@ def _box(
     x0, y0, x1, y1 = world.static.bounds.tolist()
     corners = np.array([(x0, y0, 0.0), (x1, y0, 0.0), (x1, y1, 0.0), (x0, y1, 0.0)])
     box = _from_world(corners, world.robot_pose, turn)[:, :2]
-    low, high = box.min(axis=0), box.max(axis=0)
+    low = box.min(axis=0)
+    high = box.max(axis=0)
     margin = min(margin, 0.25 * float(high[0] - low[0]))
     low[0] = min(low[0] + margin, max(low[0], -bulge if off > 0.0 else 0.0))
     high[0] = max(high[0] - margin, min(high[0], bulge if off < 0.0 else 0.0))
@@ -150,8 +157,10 @@ def _costs_to_go(
     radius: float,
 ) -> IceCostToGo:
     vertices = world.robot.vertices
-    length, away = float(np.ptp(vertices[:, 0])), max(channel.goal, 0.0)
-    width, ahead = float(channel.high[0] - channel.low[0]), away + length
+    length = float(np.ptp(vertices[:, 0]))
+    away = max(channel.goal, 0.0)
+    width = float(channel.high[0] - channel.low[0])
+    ahead = away + length
     # a table over wide water is coarser, so that it is there in milliseconds
     places = (width / (config.column * length)) * (ahead / (config.row * length))
     coarser = length * max(1.0, math.sqrt(places / _MOST_PLACES))
@@ -175,7 +184,8 @@ def _costs_to_go(
     )
     radii = np.sqrt(areas_and_centroids(bodies.vertices, bodies.offsets)[0] / np.pi)
     half_beam = 0.5 * float(np.ptp(vertices[:, 1]))
-    gain, crowding = float(config.gain), float(config.crowding)
+    gain = float(config.gain)
+    crowding = float(config.crowding)
     fill_field(Floes(floes, radii, bodies.masses, half_beam, gain, crowding), costs)
     fill_table(costs)
     return costs

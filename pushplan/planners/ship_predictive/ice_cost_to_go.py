@@ -56,7 +56,8 @@ class Floes(NamedTuple):
 @kernel(allocates=True)
 def fill_field(floes: Floes, out: IceCostToGo) -> None:
     """Fill ``out.field``, the mass ahead of a bow at each place, as the module says."""
-    field, masses = out.field, floes.masses
+    field = out.field
+    masses = floes.masses
     field[:] = 0.0
     rows, columns = field.shape
     for k in range(floes.poses.shape[0]):
@@ -81,8 +82,10 @@ def _sample(field: FloatArray, r: float, c: float) -> float:
     """Bilinear value of an (F, C) array, that of its edge beyond it."""
     r = min(max(r, 0.0), field.shape[0] - 1.000001)
     c = min(max(c, 0.0), field.shape[1] - 1.000001)
-    i, j = int(r), int(c)
-    u, v = r - i, c - j
+    i = int(r)
+    j = int(c)
+    u = r - i
+    v = c - j
     top = (1.0 - v) * field[i, j] + v * field[i, j + 1]
     value: float = (1.0 - u) * top + u * ((1.0 - v) * field[i + 1, j] + v * field[i + 1, j + 1])
     return value
@@ -91,7 +94,8 @@ def _sample(field: FloatArray, r: float, c: float) -> float:
 @kernel
 def mass_ahead(costs: IceCostToGo, x: float, y: float, theta: float) -> float:
     """Mass ahead of a ship at a pose [kg]: work of a metre, if no floe had moved before."""
-    bx, by = x + costs.bow * math.cos(theta), y + costs.bow * math.sin(theta)
+    bx = x + costs.bow * math.cos(theta)
+    by = y + costs.bow * math.sin(theta)
     cell = costs.cell
     return _sample(costs.field, (by - costs.field_low) / cell, (bx - costs.left) / cell)
 
@@ -126,8 +130,10 @@ def _look_up(costs: IceCostToGo, r: int, c: float, h: float) -> float:
     columns, headings = layer.shape
     beside = max(0.0, -c, c - (columns - 1.0))
     c = min(max(c, 0.0), columns - 1.0)
-    j, k = min(int(c), columns - 2), min(int(h), headings - 2)
-    u, v = c - j, h - k
+    j = min(int(c), columns - 2)
+    k = min(int(h), headings - 2)
+    u = c - j
+    v = h - k
     near = layer[j, k] + v * (layer[j, k + 1] - layer[j, k])
     far = layer[j + 1, k] + v * (layer[j + 1, k + 1] - layer[j + 1, k])
     value: float = near + u * (far - near) + _OUTSIDE * costs.mass * beside * costs.column
@@ -139,14 +145,16 @@ def cost_to_go(costs: IceCostToGo, x: float, y: float, theta: float) -> float:
     """Estimated cost from a pose to the goal line [kg m]."""
     rows, _, headings = costs.table.shape
     off = theta - 0.5 * math.pi
-    c, r = (x - costs.left) / costs.column, (y - costs.low) / costs.row
+    c = (x - costs.left) / costs.column
+    r = (y - costs.low) / costs.row
     # each radian beyond the headings of the table counts like a path beside the channel
     steep = max(0.0, abs(off) - STEEPEST)
     h = min(max((off + STEEPEST) * (headings - 1) / (2.0 * STEEPEST), 0.0), headings - 1.0)
     before = max(0.0, -r) * costs.row  # the ship goes straight up to the first row
     r = min(max(r, 0.0), rows - 1.0)
     i = min(int(r), rows - 2)
-    a, b = _look_up(costs, i, c, h), _look_up(costs, i + 1, c, h)
+    a = _look_up(costs, i, c, h)
+    b = _look_up(costs, i + 1, c, h)
     value: float = a + (r - i) * (b - a) + costs.mass * (before + _OUTSIDE * steep * costs.bow)
     return value
 

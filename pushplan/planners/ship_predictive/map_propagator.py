@@ -24,10 +24,12 @@ class MapPropagator:
     batch = 8
 
     def __init__(self, view: ChannelView, network: IceNetwork) -> None:
-        self._view, self._network = view, network
+        self._view = view
+        self._network = network
         self._cell = cell_size(view.world)
         self._scale = ice_density(view.world) * self._cell**3
-        half, channel = PATCH_CELLS // 2, view.channel
+        half = PATCH_CELLS // 2
+        channel = view.channel
         reach = half * self._cell
         low = np.array([channel.low[0] - reach, -view.length - reach])
         high = np.array([channel.high[0] + reach, max(channel.goal, 0.0) + view.length + reach])
@@ -67,7 +69,8 @@ class MapPropagator:
 
     def trace(self, node: BeamNode[Patch], stopped: Callable[[], bool]) -> FloatArray | None:
         """(N, K, 3) poses of the floes at each pose of a path, by the contact model."""
-        floes, path = FloePropagator(self._view), node.path()[:, :3]
+        floes = FloePropagator(self._view)
+        path = node.path()[:, :3]
         out = self._view.floes[None]
         parts = [out]
         for i in range(0, len(path) - 1, _TRACED):

@@ -40,7 +40,8 @@ def plan_call(
         beam: BeamSearch[Any] = BeamSearch(view, config, propagator, call.check, iterations)
         search = PredictiveCall(beam, widening=call.has_rule)
         status = search.run()
-        iterations, nodes = beam.iterations, nodes + beam.nodes
+        iterations = beam.iterations
+        nodes = nodes + beam.nodes
         if status is not PlanStatus.GOAL_UNREACHABLE:
             break
     return call.result(
@@ -66,7 +67,8 @@ class PredictiveCall:
 
     def run(self) -> PlanStatus:
         """Search until done or stopped."""
-        beam, view = self.beam, self.beam.view
+        beam = self.beam
+        view = self.beam.view
         if not view.inside(view.start[None]):
             return PlanStatus.START_BLOCKED
         if view.away > view.channel.high[1]:
@@ -90,7 +92,8 @@ class PredictiveCall:
         return PlanStatus.SOLVED if view.channel.goal == view.away else PlanStatus.APPROXIMATE
 
     def _widen(self, root: BeamNode[Any]) -> None:
-        beam, config = self.beam, self.beam.config
+        beam = self.beam
+        config = self.beam.config
         width = config.beam_width(len(beam.view.near))
         if self.widening:
             width = max(2, width // 4)
@@ -110,7 +113,9 @@ class PredictiveCall:
         objects = beam.propagator.trace(node, lambda: beam.check(beam.iterations, beam.best_cost))
         if objects is None and self._best is not None:
             return
-        self._best, self._objects, beam.best_cost = node, objects, node.total
+        self._best = node
+        self._objects = objects
+        beam.best_cost = node.total
         if math.isnan(self.first):
             self.first = time.perf_counter()
 
@@ -118,18 +123,21 @@ class PredictiveCall:
         """The best path, as fast as the robot can, with what it does to the floes."""
         if self._best is None:
             return None
-        view, path = self.beam.view, self._best.path()
+        view = self.beam.view
+        path = self._best.path()
         world = view.world
         poses = view.to_world(path[:, :3])
         headings = np.unwrap(poses[:, 2])
         poses[:, 2] = headings + (world.robot_pose[2] - headings[0])  # whole turns
         poses[0] = world.robot_pose
-        work, objects = self._best.work, None
+        work = self._best.work
+        objects = None
         if self._objects is not None:
             work = float((step_lengths(self._objects) @ view.bodies.masses).sum())
             objects = np.repeat(world.movables.poses[None], len(path), axis=0)
             objects[:, view.near] = view.to_world(self._objects)
-        chords, swept = step_lengths(path), bare_path(poses, path[:, 3])
+        chords = step_lengths(path)
+        swept = bare_path(poses, path[:, 3])
         return replace(
             timed_plan(world, swept, self.beam.config.turn_fraction, chords),
             travel_cost=world.robot.mass * float(along_arcs(chords, path[1:, 3]).sum()),

@@ -41,7 +41,9 @@ class PublishedSearch:
         radius = turning_radius(world.robot, LATTICE.turn_fraction)
         side = _clearance(world)
         builder = LatticeBuilder(world, LATTICE, radius=radius, side=side, stopped=stopped)
-        self._view, self._weight, self._stopped = view, weight, stopped
+        self._view = view
+        self._weight = weight
+        self._stopped = stopped
         self._propagator = MapPropagator(view, network)
         self._built = builder.build()
         # in half hull lengths, so that lengths count the same against changes for every ship
@@ -84,7 +86,8 @@ class PublishedSearch:
             Stopped: if the stop rule fires.
         """
         go_on(self._stopped)
-        lattice, motions = self._built.lattice, self._built.motions
+        lattice = self._built.lattice
+        motions = self._built.motions
         node = int(take(self._star.state))
         if node < 0:
             return False
@@ -107,7 +110,8 @@ class PublishedSearch:
         ice: Patch,
     ) -> None:
         """Open the ends of edges from a node; what they do to its ice takes one network call."""
-        state, lattice = self._star.state, self._built.lattice
+        state = self._star.state
+        lattice = self._built.lattice
         before = 0.0 if parent < 0 else float(state.costs[parent])
         made: list[tuple[Patch, float]] = []
         for first in range(0, len(paths), self._propagator.batch):
@@ -123,9 +127,11 @@ class PublishedSearch:
 
     def _pose(self, node: int) -> FloatArray:
         """(3,) a node's pose in the frame of the channel."""
-        lattice, (row, column, _) = self._built.lattice, self._built.start
+        lattice = self._built.lattice
+        (row, column, _) = self._built.start
         h, u, v = place_of(lattice, node)
-        ahead, left = lattice.step * (u - row), lattice.step * (v - column)
+        ahead = lattice.step * (u - row)
+        left = lattice.step * (v - column)
         return np.array([-left, ahead, self._built.motions.angles[h] + 0.5 * math.pi])
 
     def _path(self, start: FloatArray, pieces: FloatArray) -> FloatArray:
@@ -136,7 +142,8 @@ class PublishedSearch:
 
     def plan(self) -> Plan:
         """Along the path to the goal; of the floes it predicts nothing but the map."""
-        world, goal = self._view.world, int(self._star.state.heap[0])
+        world = self._view.world
+        goal = int(self._star.state.heap[0])
         arcs = path_arcs(self._built, self._star, self._curves, goal)
         return timed_path(world, *lay_path(self._built, arcs, world, LATTICE))
 

@@ -29,7 +29,8 @@ def tight_turn(view: ChannelView) -> FloatArray | None:
         curvature = side / view.radius
         middle = view.start[2] + 0.5 * curvature * along
         chord = along * np.sinc(0.5 * curvature * along / np.pi)
-        x, y = chord * np.cos(middle), chord * np.sin(middle)
+        x = chord * np.cos(middle)
+        y = chord * np.sin(middle)
         # headings near those of the table of costs to go
         heading = view.start[2] + curvature * along + (side != near) * near * 2.0 * math.pi
         arc = np.column_stack([x, y, heading, np.full(count + 1, curvature)])

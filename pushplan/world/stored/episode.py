@@ -86,7 +86,8 @@ class Episode(ArrayRecord, CheckedFields):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        length, count = len(self.times), len(self.world.movables)
+        length = len(self.times)
+        count = len(self.world.movables)
         put = object.__setattr__
         if length == 0 or (np.diff(self.times) <= 0.0).any():
             raise InvalidInputError("episode.times must hold at least one instant and increase")

@@ -62,7 +62,8 @@ def read_nav2_grid(path: str | Path) -> tuple[IntArray, float, FloatArray]:
     Raises:
         As `load_nav2_map`.
     """
-    data, path = read_data(path, "map file"), Path(path)
+    data = read_data(path, "map file")
+    path = Path(path)
     try:
         known_keys("map file", data, None, _REQUIRED)
         mode = choice("map mode", word("mode", data.get("mode", "trinary")).lower(), _MODES)
@@ -91,7 +92,9 @@ def _compared(grey: IntArray, negate: bool, low: float, high: float, scale: bool
     """Cells by two thresholds that belong to the values they bound, in float32 as Nav2 does."""
     shade = grey.astype(np.float32) / np.float32(255.0)
     taken = shade if negate else np.float32(1.0) - shade
-    least, most, width = np.float32(low), np.float32(high), np.float32(high - low)
+    least = np.float32(low)
+    most = np.float32(high)
+    width = np.float32(high - low)
     cells = np.full(grey.shape, -1)
     if scale and width > 0.0:
         between = (taken - least) / width * np.float32(100.0)

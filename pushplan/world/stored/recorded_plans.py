@@ -52,7 +52,8 @@ class RecordedPlans(ArrayRecord, CheckedFields):
         if (np.diff(self.times) < 0.0).any():
             raise InvalidInputError("plans.times must not decrease")
         for name, total in (("offsets", len(self.paths)), ("moved_offsets", len(self.moved))):
-            offsets, count = getattr(self, name), len(self) + 1
+            offsets = getattr(self, name)
+            count = len(self) + 1
             rises = len(offsets) == count and not (np.diff(offsets, prepend=0) < 0).any()
             if not rises or (offsets[0], offsets[-1]) != (0, total):
                 raise InvalidInputError(
@@ -84,7 +85,8 @@ class PlanRecorder:
     def __init__(self, ids: IntArray) -> None:
         self._places = {int(one): k for k, one in enumerate(ids)}
         self._last: Plan | None = None
-        self._seen, self._stride = 0, 1
+        self._seen = 0
+        self._stride = 1
         self._kept: list[tuple[float, FloatArray, IntArray, FloatArray]] = []
         """When each plan was taken up, its path, the objects that move, and their poses."""
 

@@ -140,7 +140,8 @@ def load_world(path: str | Path) -> World:
         SchemaError: if the file is missing, over a limit of `safe_files`, not readable as JSON or
             YAML, or off the schema.
     """
-    data, path = read_data(path, "world file"), Path(path)
+    data = read_data(path, "world file")
+    path = Path(path)
     try:
         return world_from_dict(data, path.parent)
     except InvalidInputError as error:
@@ -171,7 +172,8 @@ def robot_from_dict(data: object) -> tuple[RobotModel, Any, Any]:
         SchemaError, InvalidInputError: as `world_from_dict`.
     """
     fields = dict(known_keys("robot", data, (*_ROBOT_KEYS, "pose", "twist"), _ROBOT_NEEDS))
-    pose, twist = fields.pop("pose"), fields.pop("twist", None)
+    pose = fields.pop("pose")
+    twist = fields.pop("twist", None)
     robot = RobotModel(**fields)
     checked = array("robot.pose", pose, (3,))
     return robot, checked, None if twist is None else array("robot.twist", twist, (3,))
@@ -188,7 +190,8 @@ def _static(data: object, folder: Path) -> StaticMap:
         bounds = grid.bounds if bounds is None else bounds
     elif "unknown" in data:
         raise SchemaError("static.unknown says how to read a map: it needs static.map")
-    lines, radii = [], []
+    lines = []
+    radii = []
     for i, segment in enumerate(_list("static.segments", data.get("segments", []))):
         known_keys(f"static.segments[{i}]", segment, ("from", "to", "radius"), ("from", "to"))
         ends = [_list(f"static.segments[{i}].{end}", segment[end]) for end in ("from", "to")]
@@ -229,7 +232,8 @@ def movables_from_list(data: object) -> Movables:
         if "polygon" in item:
             corners = convex_outline(f"{name}.polygon", item["polygon"])
             shape = Movables.from_polygons([corners])
-            outline, given["pose"] = shape.outline(0), shape.poses[0]
+            outline = shape.outline(0)
+            given["pose"] = shape.poses[0]
         else:
             outline = convex_outline(f"{name}.outline", item["outline"])
         if given.get("mass") is None:
