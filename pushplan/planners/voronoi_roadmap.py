@@ -6,16 +6,13 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import networkx as nx
 import numpy as np
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import connected_components, dijkstra
-from scipy.spatial import Delaunay, QhullError, cKDTree
+import shapely
+from scipy.spatial import QhullError, Voronoi, cKDTree
 
-from pushplan.compiled import kernel
 from pushplan.control import PurePursuit
 from pushplan.geometry import VisibilityGraph
-from pushplan.geometry.obstacle_grid import ObstacleGrid, obstacle_grid, sees
-from pushplan.geometry.obstacles import Obstacles, obstacles_of
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.polyline_plan import polyline_plan, polyline_status
 from pushplan.motion.speed_profile import start_margin
@@ -38,8 +35,8 @@ _MOST_SITES = 2000
 """Points on outlines at most, but for three on each, or one of more outlines than this.
 
 Time and what cannot be interrupted, Qhull, grow with them."""
-_LINES = 2000  # lines that are looked along between two looks at the stop rule
-_SAME = 1e-6  # distance of corners of the diagram that differ by rounding only [R]
+_ENTRIES = 8  # corners of the diagram, the nearest ones, from which the robot may choose
+_LINES = 500  # lines that are looked along between two looks at the stop rule
 
 
 @dataclass(frozen=True)
@@ -69,8 +66,8 @@ class Skeleton:
     ) -> PlanResult:
         """Plan from ``world``; exact and without chance, so ``rng`` is not needed.
 
-        The stop rule is looked at between the steps of the diagram, the longest of which takes 5
-        to 20 ms. Where the diagram leads nowhere, the shortest path around the walls is taken.
+        The stop rule is looked at between the steps of the diagram, the longest of which takes 10
+        to 50 ms. Where the diagram leads nowhere, the shortest path around the walls is taken.
 
         The status is `PATH_ONLY` where the robot cannot drive the path as it stands.
 
@@ -147,141 +144,101 @@ class Skeleton:
         """The cheapest path along the diagram, None where it does not lead to the goal."""
         go_on(stopped)
         # about the robot, in units of its size: the same diagram wherever the world is
-        start = world.robot_pose[:2]
+        origin = world.robot_pose[:2]
         size = world.robot.circumscribed_radius
-        sites = (sites - start) / size
+        sites = (sites - origin) / size
         try:
-            triangles = Delaunay(sites)
+            diagram = Voronoi(sites)
         except QhullError:
             return None  # all points on one line
         go_on(stopped)
-        # its dual: corners of the diagram are circumcentres, and neighbours share a ridge
-        corners = _circumcentres(sites[triangles.simplices])
-        first, opposite = np.nonzero(triangles.neighbors > np.arange(len(corners))[:, None])
-        ridges = np.column_stack([first, triangles.neighbors[first, opposite]])
-        turn = np.array([[1, 2], [2, 0], [0, 1]])[opposite]
-        between = owners[np.take_along_axis(triangles.simplices[first], turn, axis=1)]
-        low, high = (world.static.bounds - np.tile(start, 2)).reshape(2, 2) / size
-        inside: BoolArray = np.all((corners >= low) & (corners <= high), axis=1)
-        corners[~inside] = low  # some are infinitely far; no ridge that stays leads to them
+        corners = diagram.vertices
+        low, high = (world.static.bounds.reshape(2, 2) - origin) / size
+        inside = np.append(((corners >= low) & (corners <= high)).all(axis=1), False)
+        ridges = np.array(diagram.ridge_vertices)  # -1 stands for a corner infinitely far away
+        between = owners[diagram.ridge_points]
         ridges = ridges[(between[:, 0] != between[:, 1]) & inside[ridges].all(axis=1)]
-        go_on(stopped)
-        ridges = _merged(corners, ridges)
         if len(ridges) == 0:
             return None
+        # the robot enters the diagram by the nearest corners
+        used = np.unique(ridges)
+        start = len(corners)
+        nearest = cKDTree(corners[used]).query(np.zeros((1, 2)), k=min(_ENTRIES, len(used)))[1]
+        nearest = np.atleast_1d(nearest.squeeze())
+        entries = np.column_stack([np.full(len(nearest), start), used[nearest]])
+        edges = np.concatenate([ridges, entries])
+        corners = np.concatenate([corners, np.zeros((1, 2))])
+        places = origin + size * corners
+        is_clear = _clear_of_walls(world, stopped)
+        edges = edges[is_clear(places[edges[:, 0]], places[edges[:, 1]])]
         go_on(stopped)
-        goal = world.navigation_goal
-        vertices = np.concatenate([corners, np.zeros((1, 2))])
-        # the robot enters the diagram by the nearest vertices
-        known = np.unique(ridges)
-        _, nearest = cKDTree(corners[known]).query(np.zeros(2), k=min(8, len(known)))
-        entry = known[np.atleast_1d(nearest)]
-        ways = np.column_stack([np.full(len(entry), len(vertices) - 1), entry])
-        edges = np.concatenate([ridges, ways])
-        walls = _Walls(world, stopped)
-        places = start + size * vertices
-        edges = edges[walls.are_clear(places[edges[:, 0]], places[edges[:, 1]])]
         half = max(world.robot.inscribed_radius / size, 0.1)
-        clear = np.asarray(cKDTree(sites).query(vertices)[0])
+        room = np.asarray(cKDTree(sites).query(corners)[0])
         a = edges[:, 0]
         b = edges[:, 1]
-        lengths = np.hypot(*(vertices[a] - vertices[b]).T)
-        missing = np.maximum(1.0 - np.minimum(clear[a], clear[b]) / half, 0)
-        costs = lengths * (1.0 + self.narrow * missing) + 1e-12
+        lengths = np.hypot(*(corners[a] - corners[b]).T)
+        missing = np.maximum(1.0 - np.minimum(room[a], room[b]) / half, 0.0)
+        costs = lengths * (1.0 + self.narrow * missing)
+        ways = nx.Graph()
+        ways.add_weighted_edges_from(zip(a.tolist(), b.tolist(), costs.tolist(), strict=True))
         go_on(stopped)
-        graph = csr_matrix((costs, (a, b)), shape=(len(vertices), len(vertices)))
-        table, previous = dijkstra(
-            graph, directed=False, indices=[len(vertices) - 1], return_predecessors=True
-        )
-        best = table[0]
-        before = previous[0]
-        # the last stretch is straight ahead to the goal, and a little into it
-        depth = 0.02 * size
-        if isinstance(goal, GoalDisc):
-            depth = min(depth, goal.radius)
-            towards = goal.center - places
-            away = np.hypot(*towards.T)
-            gap = away - goal.radius
-            towards /= np.maximum(away, 1e-12 * size)[:, None]
-        else:
-            gap = (goal.point - places) @ goal.normal
-            towards = np.broadcast_to(goal.normal, places.shape)
-        go_on(stopped)
-        gap = np.maximum(gap, 0.0)
-        ends = places + (gap + depth)[:, None] * towards
-        best = np.where(np.isfinite(best) & walls.are_clear(places, ends), best, np.inf)
-        total = best + gap / size * (1.0 + self.narrow * (gap > size))
-        end = int(np.argmin(total))
-        if not np.isfinite(total[end]):
+        if start not in ways:
             return None
-        chain = [end]
-        while before[chain[-1]] >= 0:
-            chain.append(int(before[chain[-1]]))
-        path = places[chain[::-1]]
-        return np.concatenate([path, ends[end][None]])
+        before, lengths_to = nx.dijkstra_predecessor_and_distance(ways, start)
+        go_on(stopped)
+        # the last stretch is straight ahead to the goal, and a little into it
+        nodes = np.array(list(lengths_to))
+        gaps, ends = _last_stretches(world, places[nodes])
+        total = np.array(list(lengths_to.values()))
+        total += gaps / size * (1.0 + self.narrow * (gaps > size))
+        for some in np.array_split(np.argsort(total, kind="stable"), math.ceil(len(nodes) / 50)):
+            clear = some[is_clear(places[nodes[some]], ends[some])]
+            if len(clear):
+                chain = [int(nodes[clear[0]])]
+                while before[chain[-1]]:
+                    chain.append(before[chain[-1]][0])
+                return np.concatenate([places[chain[::-1]], ends[clear[0]][None]])
+        return None
 
 
-class _Walls:
-    """What the robot's inscribed disc may not touch."""
+def _last_stretches(world: World, places: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Distances (N,) from places (N, 2) to the goal, and where they end, a little into it [m]."""
+    goal = world.navigation_goal
+    depth = 0.02 * world.robot.circumscribed_radius
+    if isinstance(goal, GoalDisc):
+        depth = min(depth, goal.radius)
+        towards = goal.center - places
+        away = np.hypot(*towards.T)
+        gaps = away - goal.radius
+        towards /= np.maximum(away, 1e-12)[:, None]
+    else:
+        gaps = (goal.point - places) @ goal.normal
+        towards = np.broadcast_to(goal.normal, places.shape)
+    gaps = np.maximum(gaps, 0.0)
+    return gaps, places + (gaps + depth)[:, None] * towards
 
-    def __init__(self, world: World, stopped: Callable[[], bool]) -> None:
-        static = keep_out(world)
-        clearance = (1.0 - 1e-6) * world.robot.inscribed_radius
-        self._obstacles = obstacles_of(static, clearance)
-        self._grid = obstacle_grid(static, clearance, 0.0)
-        self._seen = np.zeros(len(self._obstacles.radii) + 1, dtype=np.int64)
-        self._stopped = stopped
 
-    def are_clear(self, a: FloatArray, b: FloatArray) -> BoolArray:
-        """True if the lines from (N, 2) ``a`` to (N, 2) ``b`` keep clear of them.
+def _clear_of_walls(
+    world: World, stopped: Callable[[], bool]
+) -> Callable[[FloatArray, FloatArray], BoolArray]:
+    """A function of the ends (N, 2) of lines [m]: True where the inscribed disc can go along.
 
-        Raises:
-            Stopped: if the stop rule fires.
-        """
+    It raises `Stopped` if the stop rule fires.
+    """
+    walls = shapely.STRtree([shapely.Polygon(part) for part in keep_out(world).convex_parts])
+    clearance = (1.0 - 1e-6) * world.robot.inscribed_radius
+
+    def is_clear(a: FloatArray, b: FloatArray) -> BoolArray:
         clear = np.ones(len(a), dtype=np.bool_)
-        for i in range(0, len(a) if len(self._seen) > 1 else 0, _LINES):
-            go_on(self._stopped)
-            part = slice(i, i + _LINES)
-            _see(a[part], b[part], self._obstacles, self._grid, self._seen, clear[part])
+        lines = shapely.linestrings(np.stack([a, b], axis=1))
+        for first in range(0, len(a), _LINES):
+            go_on(stopped)
+            part = lines[first : first + _LINES]
+            near, _ = walls.query(part, predicate="dwithin", distance=clearance)
+            clear[first + near] = False
         return clear
 
-
-@kernel
-def _see(
-    a: FloatArray,
-    b: FloatArray,
-    obstacles: Obstacles,
-    grid: ObstacleGrid,
-    seen: IntArray,  # memory of `sees`
-    clear: BoolArray,  # (N,) receives which lines keep clear
-) -> None:
-    for i in range(a.shape[0]):
-        clear[i] = sees(a[i, 0], a[i, 1], b[i, 0], b[i, 1], obstacles, 0.0, grid, seen)
-
-
-def _merged(corners: FloatArray, ridges: IntArray) -> IntArray:
-    """Ridges (M, 2) between different corners: four sites on one circle make the same one twice."""
-    known, named = np.unique(ridges, return_inverse=True)
-    pairs = cKDTree(corners[known]).query_pairs(_SAME, output_type="ndarray")
-    shape = (len(known), len(known))
-    same = csr_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=shape)
-    _, group = connected_components(same, directed=False)
-    _, first = np.unique(group, return_index=True)
-    merged: IntArray = known[first[group[named.reshape(-1, 2)]]]
-    different: BoolArray = merged[:, 0] != merged[:, 1]
-    return np.ascontiguousarray(merged[different])
-
-
-def _circumcentres(triangles: FloatArray) -> FloatArray:
-    """(T, 2) of triangles (T, 3, 2), not finite where one is flat."""
-    u = triangles[:, 1] - triangles[:, 0]
-    v = triangles[:, 2] - triangles[:, 0]
-    uu = (u**2).sum(axis=1)
-    vv = (v**2).sum(axis=1)
-    twice = 2.0 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
-    away = np.column_stack([v[:, 1] * uu - u[:, 1] * vv, u[:, 0] * vv - v[:, 0] * uu])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(triangles[:, 0] + away / twice[:, None])
+    return is_clear
 
 
 def _outlines(world: World) -> tuple[FloatArray, IntArray]:
