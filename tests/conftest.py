@@ -154,6 +154,19 @@ def cpu_time(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(time, "perf_counter", time.process_time)
 
 
+def leave_figures_empty(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let reports have empty figures: drawing takes longer than all the rest of a report."""
+    from matplotlib.figure import Figure
+
+    monkeypatch.setattr("pushplan.evaluation.report.plots.draw", lambda run, name: Figure())
+
+
+@pytest.fixture
+def empty_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same for a test that is about something else."""
+    leave_figures_empty(monkeypatch)
+
+
 @pytest.fixture
 def u_maze() -> World:
     return make_u_maze([[4, 9, 0.3], [10, 12, 0.0], [13, 8, 0.7]])

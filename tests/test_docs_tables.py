@@ -29,6 +29,7 @@ After.
 """
 
 
+@pytest.mark.slow
 def test_the_pages_have_what_the_stored_episodes_give(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--check"]) == 0, capsys.readouterr().out
 

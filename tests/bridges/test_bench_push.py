@@ -7,6 +7,7 @@ import importlib.util
 import json
 import os
 import re
+import runpy
 import subprocess
 import sys
 import venv
@@ -354,6 +355,14 @@ def test_what_is_missing_is_said() -> None:
         (("--seeds", "5-3"), "FIRST-LAST"),
     ],
 )
-def test_bad_arguments(arguments: tuple[str, str], words: str) -> None:
-    done = bench("--python", "nothing", *arguments)
-    assert done.returncode == 2 and words in done.stderr
+def test_bad_arguments(
+    arguments: tuple[str, str],
+    words: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(sys, "path", list(sys.path))  # the script adds its folder
+    monkeypatch.setattr(sys, "argv", ["bench.py", "--python", "nothing", *arguments])
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_path(str(BRIDGE / "bench.py"), run_name="__main__")
+    assert ended.value.code == 2 and words in capsys.readouterr().err

@@ -27,11 +27,6 @@ def paper(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     return importlib.import_module("paper")
 
 
-def beside(*arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, str(SCRIPT), *arguments]
-    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
-
-
 def test_the_papers_tables_are_as_printed(paper: ModuleType) -> None:
     tables = {table.suite: table for table in paper.published_tables()}
     assert set(tables) <= set(suite_names())
@@ -57,12 +52,17 @@ def test_the_experiment_has_every_suite_of_the_paper(paper: ModuleType) -> None:
     assert shipped.skipped and shipped.jobs
 
 
-def test_ours_beside_theirs(tmp_path: Path, paper: ModuleType) -> None:
+def test_ours_beside_theirs(
+    tmp_path: Path,
+    paper: ModuleType,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     run, page = tmp_path / "run", tmp_path / "comparison.md"
     results = bench("maze-2d-3", ["straight", "maze-ppo"], episodes=1, workers=0, out=run)
-    done = beside(str(run), "--markdown", str(page))
-    assert done.returncode == 0, done.stderr
-    assert "RRT, legal actions" in done.stdout
+    monkeypatch.setattr(sys, "argv", ["paper.py", str(run), "--markdown", str(page)])
+    assert paper.main() == 0
+    assert "RRT, legal actions" in capsys.readouterr().out
     lines = [line for line in page.read_text().splitlines() if line.startswith("| ")]
     ours = next(line for line in lines if line.startswith("| maze-ppo | 1 |"))
     assert "1.00<br>" in ours and ours.endswith("h |")
@@ -75,7 +75,9 @@ def test_ours_beside_theirs(tmp_path: Path, paper: ModuleType) -> None:
 
 
 def test_a_run_without_the_papers_suites_is_refused(tmp_path: Path, paper: ModuleType) -> None:
-    assert beside(str(tmp_path)).stderr.count("\n") == 1
+    command = [sys.executable, str(SCRIPT), str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
+    assert done.returncode == 2 and done.stderr.count("\n") == 1
     with pytest.raises(InvalidInputError, match="no suite of the paper"):
         paper.beside(bench("maze-2d-6", ["straight"], episodes=1, workers=0))
 

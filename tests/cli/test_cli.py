@@ -141,16 +141,6 @@ def test_plan_writes_a_plan(room: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert np.hypot(*(poses[-1, :2] - [10.0, 3.0])) <= 1.0 + 1e-6
 
 
-def test_plan_loads_no_simulator(room: Path) -> None:
-    code = (
-        f"import sys; from pushplan.cli import main; main(['plan', {str(room)!r}, '--planner',"
-        "'straight']); print([m for m in ('pymunk', 'mujoco', 'gymnasium', 'torch', 'matplotlib')"
-        " if m in sys.modules])"
-    )
-    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert out.stdout.splitlines()[-1] == "[]"
-
-
 def test_errors_are_one_line_with_a_code(
     room: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

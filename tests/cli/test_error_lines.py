@@ -8,6 +8,7 @@ import pytest
 
 from pushplan.cli import main
 
+pytestmark = pytest.mark.usefixtures("empty_figures")
 ROOM = Path(__file__).parents[2] / "examples" / "room.yaml"
 MINE = """\
 import heapq

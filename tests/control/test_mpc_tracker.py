@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -191,15 +189,6 @@ def test_a_command_is_quick():
     seen = [world.moved(robot_pose=plan.poses[n // 2], time=0.3 * n) for n in range(120)]
     steps = iter(seen)
     assert quickest(lambda: tracker.command(next(steps), plan), 120) < 1.5e-3
-
-
-def test_the_solver_is_loaded_by_the_tracker_alone_and_casadi_by_nobody():
-    code = (
-        "import sys, pushplan.control as c; before = 'osqp' in sys.modules; "
-        "c.MpcTracker(); print(before, 'osqp' in sys.modules, 'casadi' in sys.modules)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "False True False"
 
 
 @pytest.mark.parametrize(

@@ -188,12 +188,11 @@ def test_infos_and_traces_say_what_happened(name):
 @pytest.mark.parametrize("simulator", SIMULATORS)
 def test_every_variation_starts_and_steps(task, variations, simulator):
     env = PushEnv(task=task, simulator=simulator, variations=variations, observation="image")
-    for seed in range(2):
-        observation, _ = env.reset(seed=seed)
-        assert observation in env.observation_space
-        observation, reward, *_ = env.step(np.zeros(env.action_space.shape))
-        assert observation in env.observation_space
-        assert np.isfinite(reward)
+    observation, _ = env.reset(seed=0)
+    assert observation in env.observation_space
+    observation, reward, *_ = env.step(np.zeros(env.action_space.shape))
+    assert observation in env.observation_space
+    assert np.isfinite(reward)
 
 
 @pytest.mark.parametrize("name", suite_names())

@@ -17,6 +17,14 @@ MAZE = Scenario("maze", variations={"boxes": 3, "time_limit": 4.0})
 CLEARING = Scenario("area_clearing", variations={"boxes": 2, "idle_limit": 3})
 
 
+@pytest.fixture(scope="module")
+def shared():
+    """Three environments in two workers; each test leaves them without a request."""
+    envs = make_vector(MAZE, 3, workers=2, observation="state")
+    yield envs
+    envs.close()
+
+
 def process_of(envs, n):
     return envs._pools[n].submit(os.getpid).result()
 
@@ -33,7 +41,10 @@ def episodes(envs, steps=9):
 
 @pytest.mark.parametrize(
     ("scenario", "observation", "mode"),
-    [(MAZE, "image", AutoresetMode.SAME_STEP), (CLEARING, "state", AutoresetMode.NEXT_STEP)],
+    [
+        (MAZE, "image", AutoresetMode.SAME_STEP),
+        pytest.param(CLEARING, "state", AutoresetMode.NEXT_STEP, marks=pytest.mark.slow),
+    ],
 )
 def test_the_same_as_in_one_process(scenario, observation, mode):
     one = partial(make, scenario, observation=observation)
@@ -44,8 +55,18 @@ def test_the_same_as_in_one_process(scenario, observation, mode):
     assert any(step[3].any() for step in here[1:])  # episodes end, and others begin
 
 
-@pytest.mark.parametrize("copy", [pytest.param(True, marks=pytest.mark.slow), False])
-def test_workers_that_do_not_wait_for_each_other_run_the_same_episodes(copy):
+@pytest.mark.slow
+def test_workers_that_do_not_wait_run_the_same_episodes_without_copies():
+    envs = make_vector(MAZE, 3, workers=2, observation="state", copy=False)
+    check_that_nobody_waits(envs)
+    envs.close()
+
+
+def test_workers_that_do_not_wait_for_each_other_run_the_same_episodes(shared):
+    check_that_nobody_waits(shared)
+
+
+def check_that_nobody_waits(workers):
     one, steps, count = partial(make, MAZE, observation="state"), 9, 3
     actions = np.random.default_rng(0).uniform(-1, 1, (steps, count, 1)).astype(np.float32)
     envs = SyncVectorEnv([one] * count)
@@ -55,7 +76,7 @@ def test_workers_that_do_not_wait_for_each_other_run_the_same_episodes(copy):
         for i in range(count):
             here[i].append((observations[i], rewards[i], terminated[i], truncated[i]))
     envs.close()
-    envs = make_vector(MAZE, count, workers=2, observation="state", copy=copy)
+    envs = workers
     envs.async_reset(seed=5)
     there, owed = [[] for _ in range(count)], 2
     while owed:
@@ -71,11 +92,10 @@ def test_workers_that_do_not_wait_for_each_other_run_the_same_episodes(copy):
             envs.send(actions[done, batch], batch)
             owed += 1
     assert data_equivalence(here, there, exact=True)
-    envs.close()
 
 
-def test_requests_out_of_turn_are_refused():
-    envs = make_vector(MAZE, 3, workers=2, observation="state")
+def test_requests_out_of_turn_are_refused(shared):
+    envs = shared
     with pytest.raises(InvalidInputError, match=r"call async_reset\(\) or send\(\)"):
         envs.recv()
     envs.async_reset(seed=0)
@@ -96,15 +116,25 @@ def test_requests_out_of_turn_are_refused():
     envs.recv()
     envs.recv()
     assert envs.step(envs.action_space.sample())[1].shape == (3,)
+
+
+@pytest.mark.parametrize("waits", [True, pytest.param(False, marks=pytest.mark.slow)])
+def test_a_worker_that_is_killed_is_named(waits):
+    envs = make_vector(MAZE, 3, workers=2, observation="state")
+    envs.reset(seed=0)
     process = process_of(envs, 1)
-    envs.async_reset(seed=0)
+    if not waits:
+        envs.async_reset(seed=0)
     os.kill(process, signal.SIGKILL)
-    with pytest.raises(VectorWorkerError, match="environments 1 to 2"):
+    with pytest.raises(VectorWorkerError, match="environments 1 to 2 has ended"):
+        if waits:
+            envs.step(envs.action_space.sample())
         for _ in range(2):
             envs.recv()
     envs.close()
-    with pytest.raises(InvalidInputError, match="closed"):
-        envs.recv()
+    for request in (envs.recv, envs.reset):
+        with pytest.raises(InvalidInputError, match="closed"):
+            request()
 
 
 @pytest.mark.slow
@@ -134,28 +164,22 @@ def test_observations_stay_unless_that_is_not_wanted():
         envs.close()
 
 
-def test_errors_of_a_worker_arrive_here_and_harm_nothing():
-    envs = make_vector(MAZE, 2, workers=2, observation="state")
+def test_errors_of_a_worker_arrive_here_and_harm_nothing(shared):
+    envs = shared
     envs.reset(seed=0)
     with pytest.raises(AttributeError, match="nonsense"):
         envs.call("nonsense")
-    for unreadable in (lambda: None, [1, lambda: None]):
+    for unreadable in (lambda: None, [1, 2, lambda: None]):
         with pytest.raises(Exception, match="pickle"):
             envs.set_attr("note", unreadable)
-    envs.set_attr("note", [1, 2])
-    assert envs.get_attr("note") == (1, 2)  # answers are those of this request
+    envs.set_attr("note", [1, 2, 3])
+    assert envs.get_attr("note") == (1, 2, 3)  # answers are those of this request
     with pytest.raises(InvalidInputError, match="reset_mask must be of dtype bool"):
-        envs.reset(options={"reset_mask": np.zeros(2, dtype=bool)})
-    assert envs.step(envs.action_space.sample())[1].shape == (2,)
-    for seed in ([1], [1, 2, 3]):
+        envs.reset(options={"reset_mask": np.zeros(3, dtype=bool)})
+    assert envs.step(envs.action_space.sample())[1].shape == (3,)
+    for seed in ([1], [1, 2, 3, 4]):
         with pytest.raises(InvalidInputError, match="seed must have one value for each"):
             envs.reset(seed=seed)
-    os.kill(process_of(envs, 1), signal.SIGKILL)
-    with pytest.raises(VectorWorkerError, match="environments 1 to 1 has ended"):
-        envs.step(envs.action_space.sample())
-    envs.close()
-    with pytest.raises(InvalidInputError, match="closed"):
-        envs.reset()
 
 
 def test_what_makes_no_sense_is_refused():

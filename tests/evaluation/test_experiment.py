@@ -49,19 +49,21 @@ def test_every_policy_meets_every_scenario(study: Path) -> None:
     assert Experiment.from_dict(STUDY, study.parent).jobs == experiment.jobs
 
 
+@pytest.mark.usefixtures("empty_figures")
 def test_a_study_runs_from_the_command_line_and_goes_on(
     study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    study.write_text(yaml.safe_dump({**STUDY, "suites": ["maze-2d-3"]}))
     out = tmp_path / "run"
     command = ["experiment", str(study), "--workers", "0", "--out", str(out)]
     assert main([*command, "--check"]) == 0
-    assert "9 jobs" in capsys.readouterr().out and not out.exists()
+    assert "3 jobs" in capsys.readouterr().out and not out.exists()
     assert main(command) == 0
     said = capsys.readouterr().out
     assert "my.py:turns" in said and "report.html" in said
-    study.write_text(yaml.safe_dump({**STUDY, "episodes": 2}))
+    study.write_text(yaml.safe_dump({**STUDY, "suites": ["maze-2d-3"], "episodes": 2}))
     results = Experiment.load(study).run(out, workers=0)
-    assert len(results.rows) == 12
+    assert len(results.rows) == 6
     alone = Experiment.load(study).run(workers=0)
     assert [(r.policy, r.seed, r.E_nav) for r in alone.rows] == [
         (r.policy, r.seed, r.E_nav) for r in results.rows
@@ -173,17 +175,18 @@ def test_only_what_was_asked_for_is_left_out() -> None:
         Experiment.from_dict(data)
 
 
-@pytest.mark.parametrize(("traces", "kept"), [("all", 4), ("failures", 2), ("none", 0)])
+@pytest.mark.usefixtures("empty_figures")
+@pytest.mark.parametrize(("traces", "kept"), [("all", 2), ("failures", 1), ("none", 0)])
 def test_only_wanted_episodes_are_kept(tmp_path: Path, traces: str, kept: int) -> None:
     data = {
         "schema": "pushplan-experiment/1",
         "suites": ["maze-2d-3"],
         "policies": ["straight", "random"],
-        "episodes": 2,
+        "episodes": 1,
         "traces": traces,
     }
     results = Experiment.from_dict(data).run(tmp_path, workers=0)
-    assert [row.success for row in results.rows] == [False, False, True, True]
+    assert [row.success for row in results.rows] == [False, True]
     assert len(list((tmp_path / "episodes").iterdir())) == kept
     assert sum(results.episode(row) is not None for row in results.rows) == kept
     assert results.report().is_file()

@@ -65,8 +65,8 @@ def shown_texts(figure: Any, renderer: Any) -> list[tuple[str, Any]]:
 @pytest.mark.parametrize(
     ("policies", "settings", "long"),
     [
-        (3, 1, False),
         (2, 3, True),
+        pytest.param(3, 1, False, marks=pytest.mark.slow),
         pytest.param(9, 4, True, marks=pytest.mark.slow),
         pytest.param(20, 1, True, marks=pytest.mark.slow),
         pytest.param(2, 24, True, marks=pytest.mark.slow),

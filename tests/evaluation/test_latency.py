@@ -24,6 +24,7 @@ from pushplan.planners import PlanFollower, make_planner, make_policy
 from pushplan.scenarios import Scenario, suite
 from pushplan.world import Drive, Episode, InvalidInputError, Twist
 
+pytestmark = pytest.mark.usefixtures("empty_figures")
 MAZE = suite("maze-2d-3", episodes=1).scenarios[0]
 
 
@@ -172,7 +173,8 @@ class TestStepLate:
 class TestRunEpisode:
     def test_the_clock_of_the_world_goes_on_by_the_time_times_the_factor(self):
         policy = Turns()
-        episode = run_episode(maze(), policy, MAZE, latency_factor=3.0, clock=Ticks(0.1))
+        env = maze(variations={"time_limit": 30.0})
+        episode = run_episode(env, policy, MAZE, latency_factor=3.0, clock=Ticks(0.1))
         assert np.diff(policy.times) == pytest.approx(0.8 + 0.3)
         assert episode.about["latency_factor"] == 3.0
         assert (np.diff(episode.times) > 0.0).all()
@@ -192,8 +194,9 @@ class TestRunEpisode:
             def __call__(self) -> float:
                 return 0.0
 
-        frozen = run_episode(maze(), Turns(), MAZE)
-        instant = run_episode(maze(), Turns(), MAZE, latency_factor=1.0, clock=Instant(0.0))
+        env = maze(variations={"time_limit": 30.0})
+        frozen = run_episode(env, Turns(), MAZE)
+        instant = run_episode(env, Turns(), MAZE, latency_factor=1.0, clock=Instant(0.0))
         assert frozen == instant
         assert "latency_factor" not in frozen.about
 

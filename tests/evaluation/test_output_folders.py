@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from conftest import leave_figures_empty
 from evaluation_doubles import SETTINGS, line_jobs, stored_run
 
 from pushplan.cli import main
@@ -16,6 +17,7 @@ from pushplan.evaluation import Results, merge, run_batch, salvage
 from pushplan.files.output_files import write_atomic
 from pushplan.world import InvalidInputError
 
+pytestmark = pytest.mark.usefixtures("empty_figures")
 REPORT = ("report.html", "results.csv", "summary.md", "summary.csv", "differences.csv")
 
 
@@ -27,7 +29,9 @@ def run(out: Path) -> Results:
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = stored_run(tmp_path_factory.mktemp("whole") / "run")
-    Results.load(folder).report()
+    with pytest.MonkeyPatch.context() as patched:
+        leave_figures_empty(patched)
+        Results.load(folder).report()
     return folder
 
 

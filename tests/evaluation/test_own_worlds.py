@@ -16,6 +16,8 @@ from pushplan.evaluation.benchmark import suites_of
 from pushplan.scenarios import Scenario, Suite, load_scenarios, save_scenarios, suite, world_suite
 from pushplan.world import InvalidInputError, SchemaError, load_world, save_world
 
+pytestmark = pytest.mark.usefixtures("empty_figures")
+
 
 def folder_of(path: Path, *names: str) -> Path:
     path.mkdir(parents=True, exist_ok=True)

@@ -17,6 +17,7 @@ from typing import Any
 import pytest
 from evaluation_doubles import HERE, LineScenario
 
+from pushplan.cli import main
 from pushplan.evaluation import Job, JobSettings, Results, parse_policies, run_batch
 from pushplan.world import InvalidInputError, MissingDependencyError
 
@@ -185,7 +186,18 @@ def test_a_folder_of_ours_that_is_gone(tmp_path: Path, folder: str) -> None:
     assert [row.status for row in rows] == ["done"] * 4 + ["policy_error"] * 2
 
 
-def test_the_command_says_one_line_and_ends_with_2(tmp_path: Path) -> None:
+def test_the_command_says_one_line_and_ends_with_2(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(resource, "getrlimit", lambda which: (40, 40))
+    words = ["bench", "maze-2d-3", "--policies", "random", "--episodes", "1", "--workers", "1"]
+    assert main([*words, "--out", str(tmp_path / "run")]) == 2
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert said.startswith("pushplan: 1 workers need 68 file descriptors")
+
+
+@pytest.mark.slow
+def test_the_command_says_so_under_a_real_limit(tmp_path: Path) -> None:
     code = (
         "import resource, sys\n"
         "from pushplan.cli import main\n"

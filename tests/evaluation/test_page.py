@@ -164,8 +164,9 @@ def test_nothing_is_cut_off(browser: Any, folder: Path, width: int, scheme: str)
     assert one.state("isDark()") == (scheme == "dark")
 
 
+@pytest.mark.usefixtures("empty_figures")
 def test_printed_tables_keep_their_columns(browser: Any, tmp_path: Path) -> None:
-    results = many_rows(60, 3)
+    results = many_rows(24, 3)
     long = [replace(row, policy=f"{'a_very_long_name@' * 3}{row.policy}") for row in results.rows]
     page = Results(tuple(long)).report(tmp_path, replays="none", pairs="all")
     one = Opened(browser, page, viewport={"width": 1040, "height": 720})  # A4, landscape

@@ -7,9 +7,13 @@ import sqlite3
 from importlib import metadata
 from pathlib import Path
 
+import pytest
+
 import pushplan
 from pushplan.evaluation import Results, bench
 from pushplan.evaluation.store.provenance import _checkout, in_words
+
+pytestmark = pytest.mark.usefixtures("empty_figures")
 
 
 def test_each_call_that_ran_jobs_is_noted(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import leave_figures_empty
 
 from pushplan.cli import main
 from pushplan.evaluation import ResultRow, Results, bench
@@ -141,6 +142,7 @@ def test_all_settings_together_come_first_and_each_on_request(results: Results) 
     assert {row[4].split(" / ")[2] for row in pooled[1].cells} == {"38", "39"}
 
 
+@pytest.mark.usefixtures("empty_figures")
 def test_policies_are_compared_with_the_first_one_unless_asked_for(tmp_path: Path) -> None:
     rows = [row for place, name in enumerate("abc") for row in rows_of(name, 0.1 * place)]
     results = Results(tuple(rows), {"policies": {name: name for name in "bac"}})
@@ -174,7 +176,7 @@ def test_the_table_shows_means_spreads_and_intervals(results: Results) -> None:
     assert max(map(len, results.table(width=90, settings=True).splitlines())) <= 90
 
 
-def test_report_files(results: Results) -> None:
+def test_report_files(results: Results, monkeypatch: pytest.MonkeyPatch) -> None:
     page = results.report()
     folder = page.parent
     with (folder / "summary.csv").open() as file:
@@ -192,6 +194,7 @@ def test_report_files(results: Results) -> None:
     ):
         assert "mine.py:Better" in (folder / name).read_text()  # where it comes from
     before = (folder / "differences.csv").read_bytes()
+    leave_figures_empty(monkeypatch)
     results.report()
     assert (folder / "differences.csv").read_bytes() == before
 
@@ -246,6 +249,7 @@ def test_the_page_needs_no_network_and_no_name_is_code(tmp_path: Path) -> None:
     assert not re.search(r"https?://(?!www.w3.org|purl.org|creativecommons.org)", text)
 
 
+@pytest.mark.usefixtures("empty_figures")
 def test_one_policy_and_one_episode_are_enough(tmp_path: Path) -> None:
     lonely = Results(tuple(rows_of("plain", 0.0, 1)))
     assert "± 0.000" in lonely.table()
@@ -257,6 +261,7 @@ def test_no_results_is_an_error(tmp_path: Path) -> None:
         Results.load(tmp_path)
 
 
+@pytest.mark.usefixtures("empty_figures")
 @pytest.mark.slow
 def test_page_csv_and_database_of_a_folder_say_the_same(tmp_path: Path) -> None:
     many = bench("smoke", ["straight", "random"], episodes=4, workers=0, out=tmp_path)

@@ -40,7 +40,7 @@ def run(out: Path, seeds: range, names: str = "Ahead Raises", **changes: object)
 @pytest.fixture(scope="module")
 def study() -> Experiment:
     specs = (PolicySpec("straight", "straight"), PolicySpec("random", "random"))
-    return Experiment("study", (suite("maze-2d-3", episodes=3),), specs, JobSettings())
+    return Experiment("study", (suite("maze-2d-3", episodes=2),), specs, JobSettings())
 
 
 @pytest.fixture(scope="module")
@@ -53,14 +53,14 @@ def stored(study: Experiment, tmp_path_factory: pytest.TempPathFactory) -> Path:
 class TestMerge:
     def test_parts_give_what_one_machine_gives(self, tmp_path: Path) -> None:
         specs = parse_policies([f"{HERE}:{name}" for name in ("Ahead", "Raises", "Logs")])
-        jobs = [Job(spec, LineScenario(seed)) for seed in range(6) for spec in specs]
+        jobs = [Job(spec, LineScenario(seed)) for seed in range(3) for spec in specs]
         run_batch(jobs, out=tmp_path / "whole", workers=0, settings=SETTINGS)
         for part in range(3):
-            mine = jobs[part::3]
+            mine = jobs[3 * part : 3 * part + 3]
             run_batch(mine, out=tmp_path / str(part), workers=0, settings=SETTINGS)
         parts = [tmp_path / str(part) for part in range(3)]
         done = merge(tmp_path / "all", parts)
-        assert (done.added, done.known, done.differing, done.incomplete) == (18, 0, (), ())
+        assert (done.added, done.known, done.differing, done.incomplete) == (9, 0, (), ())
         assert timeless(tmp_path / "all") == timeless(tmp_path / "whole")
         for row in Results.load(tmp_path / "all").rows:
             note = tmp_path / "all" / "failures" / f"{row.job}.txt"
@@ -68,7 +68,7 @@ class TestMerge:
             assert (Results.load(tmp_path / "all").episode(row) is not None) == bool(row.trace)
         assert len(Results.load(tmp_path / "all").about["runs"]) == 3
         again = merge(tmp_path / "all", parts)
-        assert (again.added, again.known, again.differing) == (0, 18, ())
+        assert (again.added, again.known, again.differing) == (0, 9, ())
 
     def test_the_parts_of_an_experiment_are_all_of_it(self, study: Experiment) -> None:
         from pushplan.evaluation.experiment import part_of
@@ -122,10 +122,11 @@ class TestMerge:
 
 class TestReproduce:
     def test_a_job_comes_out_the_same(self, stored: Path) -> None:
-        for row in Results.load(stored).rows[::3]:
-            again = reproduce(stored, row.job[:10])
-            assert again.same and not again.changed
-            assert again.again.E_nav == row.E_nav
+        row = Results.load(stored).rows[-1]
+        assert row.policy == "straight" and row.E_nav
+        again = reproduce(stored, row.job[:10])
+        assert again.same and not again.changed
+        assert again.again.E_nav == row.E_nav
 
     @pytest.mark.slow
     def test_what_differs_is_named(
@@ -157,7 +158,7 @@ class TestRescore:
         merge(tmp_path, [stored])
         before = Results.load(tmp_path).rows
         done = rescore(tmp_path)
-        assert (done.episodes, done.changed, done.unreadable) == (6, (), ())
+        assert (done.episodes, done.changed, done.unreadable) == (4, (), ())
         with sqlite3.connect(tmp_path / "results.db") as db:
             db.execute("UPDATE results SET path_length_m = 1.0 WHERE job = ?", (before[2].job,))
         assert rescore(tmp_path).changed == (before[2].job,)
@@ -170,7 +171,7 @@ class TestRescore:
         file = tmp_path / "mine.py"
         file.write_text("def steps(episode):\n    return len(episode.actions)\n")
         metric = f"{file}:steps"
-        assert rescore(tmp_path / "run", [metric], columns=False).episodes == 6
+        assert rescore(tmp_path / "run", [metric], columns=False).episodes == 4
         assert rescore(tmp_path / "run", [metric], columns=False).episodes == 0
         results = Results.load(tmp_path / "run")
         row = results.rows[0]
@@ -178,7 +179,7 @@ class TestRescore:
         assert "mine.py:steps" in results.table()
         file.write_text("def steps(episode):\n    return 2 * len(episode.actions)\n")
         assert main(["runs", "rescore", str(tmp_path / "run"), "--metrics", metric]) == 0
-        assert "6 episodes scored, 0 rows changed" in capsys.readouterr().out
+        assert "4 episodes scored, 0 rows changed" in capsys.readouterr().out
         again = Results.load(tmp_path / "run").measured[row.job]["mine.py:steps"]
         assert row.steps is not None and again == 2 * row.steps
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -217,6 +217,7 @@ def test_bad_settings_are_refused(bad: dict[str, Any]) -> None:
         ObjectTracker(**bad)
 
 
+@settings(max_examples=40)
 @given(st.integers(0, 10**6))
 def test_whatever_is_seen_gives_valid_objects(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -114,7 +114,7 @@ class TestEveryPlanner:
             assert again.status is PlanStatus.CANCELLED and again.plan is None
 
     def test_a_rule_may_be_used_again(self, name):
-        rule = MaxIterations(2000)
+        rule = MaxIterations(600)
         planner, world = make_planner(name), start(name)
         plans = [planner.plan(world, stop=rule, rng=np.random.default_rng(3)) for _ in range(2)]
         assert plans[0].plan == plans[1].plan

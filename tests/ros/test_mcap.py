@@ -243,7 +243,7 @@ def test_commands_write_and_score_mcap(
     assert "--out writes one episode" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("cut", [0, 4, 7, 8, 30, 500, 5000, 0.5, -1, -9, -40])
+@pytest.mark.parametrize("cut", [0, 8, 30, 5000, 0.5, -1, -40])
 def test_a_truncated_file_is_one_clear_error(tmp_path: Path, maze: Episode, cut: float) -> None:
     path = tmp_path / "cut.mcap"
     save_episode(maze, path)

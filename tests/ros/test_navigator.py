@@ -284,8 +284,18 @@ def empty_room(*blocks):
     return MESSAGES.occupancy(grid, 0.05)
 
 
-@pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.parametrize("stamp", [100.0, 3.0])
+@pytest.mark.parametrize(
+    ("shape", "stamp"),
+    [
+        *((shape, 100.0) for shape in SHAPES),
+        ("passes its end", 3.0),
+        *(
+            pytest.param(shape, 3.0, marks=pytest.mark.slow)
+            for shape in SHAPES
+            if shape != "passes its end"
+        ),
+    ],
+)
 def test_a_path_that_passes_its_own_end_is_driven_to_its_end(shape, stamp):
     corners = SHAPES[shape]
     path, length = given_path(corners, stamp)

@@ -2,7 +2,7 @@ import pickle
 import re
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pushplan.scenarios import (
@@ -29,6 +29,7 @@ scenarios = st.builds(
 )
 
 
+@settings(max_examples=40)
 @given(st.lists(scenarios, max_size=4))
 def test_yaml_file_gives_back_equal_scenarios(tmp_path_factory, items):
     path = tmp_path_factory.mktemp("scenarios") / "s.yaml"
