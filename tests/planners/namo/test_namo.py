@@ -214,7 +214,10 @@ def episode_succeeds(name: str, number: int) -> bool:
     return run_episode(JobSettings().environment(scenario, policy), policy, scenario).success
 
 
-@pytest.mark.parametrize(("name", "number"), [("namo-2d-order", 0), ("namo-2d-fixed", 2)])
+@pytest.mark.parametrize(
+    ("name", "number"),
+    [pytest.param("namo-2d-order", 0, marks=pytest.mark.slow), ("namo-2d-fixed", 2)],
+)
 def test_an_episode_ends_in_the_goal(name: str, number: int) -> None:
     assert episode_succeeds(name, number)
 

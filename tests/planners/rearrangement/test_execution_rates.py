@@ -10,6 +10,8 @@ from pushplan.planners.rearrangement import Gtsp, GtspMpc
 from pushplan.planners.rearrangement.greedy import GreedyPusher
 from pushplan.world import ClearanceArea, StaticMap, World, area_clearing_robot
 
+DEFAULT = ((0.05, 0.2), (0.5, 0.02))
+"""Turn rates [rad/s] and periods [s] of the default run."""
 SQUARE = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
 
 
@@ -38,9 +40,13 @@ def reach(policy, turn_rate, period):
     return np.inf, driven
 
 
-@pytest.mark.parametrize("period", [0.02, 0.2])
 @pytest.mark.parametrize(
-    "turn_rate", [0.05, 0.5, *(pytest.param(rate, marks=pytest.mark.slow) for rate in (0.1, 1.5))]
+    ("turn_rate", "period"),
+    [
+        pytest.param(rate, period, marks=() if (rate, period) in DEFAULT else pytest.mark.slow)
+        for rate in (0.05, 0.1, 0.5, 1.5)
+        for period in (0.02, 0.2)
+    ],
 )
 @pytest.mark.parametrize("policy", [GreedyPusher, Gtsp, GtspMpc])
 def test_a_box_behind_the_robot_is_reached(policy, turn_rate, period):

@@ -133,7 +133,7 @@ def test_nothing_is_given_up_while_boxes_get_nearer():
     assert info["success"]
 
 
-@pytest.mark.parametrize("apart", [1e3, 1e6])
+@pytest.mark.parametrize("apart", [pytest.param(1e3, marks=pytest.mark.slow), 1e6])
 def test_a_decision_is_bounded_however_far_the_boxes_are(apart):
     here = room([(0.5, 0.1, 0.0), (apart, apart, 0.3)])
     here = replace(here, static=StaticMap.build(bounds=(-5, -5, apart + 5, apart + 5)))
