@@ -20,19 +20,19 @@ from pushplan.world.checks import FloatArray, IntArray
 FRAME_TIME = 1.0 / 30.0
 """Frames follow each other no faster than this [s]."""
 TICK = 0.01
-"""How often keys are looked at while waiting [s]."""
+"""Interval at which keys are read while waiting [s]."""
 LATE = 0.25
 """A machine that falls behind by more than this gives up the delay instead of racing [s]."""
 
 
 class Display(Protocol):
-    """Where a person looks and types."""
+    """Window in which a person watches and types."""
 
     keyboard: Keyboard
 
     @property
     def closed(self) -> bool:
-        """Whether the person has closed it."""
+        """True once the person has closed the window."""
 
     def show(self, frame: NDArray[np.uint8]) -> None:
         """Show a frame (H, W, 3)."""
@@ -70,7 +70,7 @@ class Pilot:
         """Nothing to prepare."""
 
     def act(self, world: World, observation: Any) -> Twist:
-        """What the keys ask for."""
+        """Return the velocity that the pressed keys command."""
         return twist_of(self._keyboard.held(self._now()), world.robot)
 
 

@@ -1,4 +1,4 @@
-"""What several commands share."""
+"""Helpers that several commands share."""
 
 from __future__ import annotations
 
@@ -50,12 +50,12 @@ def save_episode(episode: Episode, path: str) -> None:
 
 
 def is_mcap(path: str) -> bool:
-    """Whether a file is a log as robots keep them, by its ending."""
+    """Return True if a file is an MCAP log, as robots record them, by its ending."""
     return path.lower().endswith(".mcap")
 
 
 def has_screen() -> bool:
-    """Whether windows can be shown: on Linux a display server says so in the environment."""
+    """Return True if windows can be shown; on Linux the environment names a display server."""
     return sys.platform != "linux" or bool({"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys())
 
 

@@ -77,7 +77,7 @@ class Camera:
         save_animation(self.path, self._frames(episode, chosen), FPS)
 
     def _legend(self) -> list[Entry]:
-        """What some frame shows; the same in all of them."""
+        """Return the legend of everything that some frame shows; the same in all frames."""
         plans = [(world, plan) for world, plan in self._steps if plan is not None]
         predicted = any(pushed(world, plan) for world, plan in plans)
         first = self._steps[0][0]

@@ -14,14 +14,14 @@ from typing import Any
 from pushplan.cli.common import duration
 
 SECONDS_A_KERNEL = 1.2
-"""What one takes to compile [s of CPU]: the mean of the table in docs/compilation.md."""
+"""Mean time to compile a kernel [s of CPU], from the table in docs/compilation.md."""
 
 _LINGER_S = 3.0  # between two kernels a process imports and loads
 
 
 @dataclass
 class KernelProgress:
-    """What has become ready so far in this process."""
+    """Count of the kernels that this process has compiled or loaded so far."""
 
     # names of the kernels that are to come; empty if that is not known
     expected: frozenset[str] = frozenset()
@@ -73,7 +73,7 @@ class PendingKernels:
         self._missing = frozenset()
 
     def __str__(self) -> str:
-        """How long it may take, while some process compiles one of them; else empty."""
+        """Say how long compiling may take while a process compiles a missing kernel; else empty."""
         from pushplan.compiled import cached_kernels, compiling_kernels
 
         now = time.monotonic()
@@ -86,7 +86,7 @@ class PendingKernels:
 
 
 def in_words(missing: int) -> str:
-    """How long it takes, at most, to compile so many kernels on one core."""
+    """Say how long compiling so many kernels takes, at most, on one core."""
     about = max(1.0, round(SECONDS_A_KERNEL * missing))
     return f"compiling kernels, about {duration(about)} at most, once"
 

@@ -1,4 +1,4 @@
-"""What a person wants whose fingers are on these keys. Knows no window and no clock."""
+"""Driving commands from the keys that a person presses. Knows no window and no clock."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ COMFORTABLE_TURN = 1.0
 
 
 class Keyboard:
-    """Which keys are down, from the events of a window."""
+    """Set of the keys that are down, tracked from the events of a window."""
 
     def __init__(self) -> None:
         self._down: set[str] = set()
@@ -57,7 +57,7 @@ class Keyboard:
             self._released[wish] = now
 
     def held(self, now: float) -> frozenset[str]:
-        """What is asked of the robot, with what was tapped since the last call."""
+        """Return the commands of the keys that are down or were tapped since the last call."""
         for wish, when in list(self._released.items()):
             if now - when >= GRACE:
                 self._down.discard(wish)
@@ -68,11 +68,11 @@ class Keyboard:
 
     @property
     def touched(self) -> bool:
-        """Whether a driving key is down or was tapped since `held` was last called."""
+        """True if a driving key is down or was tapped since `held` was last called."""
         return bool(self._down or self._tapped)
 
     def take(self, wish: str) -> bool:
-        """Whether ``"quit"`` or ``"restart"`` was asked for since this was last called."""
+        """Return True if ``"quit"`` or ``"restart"`` was requested since this was last called."""
         asked = wish in self._asked
         self._asked.discard(wish)
         return asked

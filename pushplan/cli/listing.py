@@ -39,7 +39,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _say_kinds(options: argparse.Namespace) -> None:
-    """What can be listed: one line a kind, with the number of its names."""
+    """Print the kinds that can be listed: one line a kind, with the number of its names."""
     counts = {kind: len(names_of(kind)) for kind in _KINDS}
     if options.json:
         say_json([{"kind": k, "count": n, "what": _KINDS[k]["what"]} for k, n in counts.items()])
@@ -169,7 +169,7 @@ def robot_facts(name: str) -> dict[str, str]:
 
 
 def condition_facts(name: str) -> dict[str, str]:
-    """What it disturbs, and what is asked of a policy."""
+    """Describe the disturbances of a stress condition, and the success that it asks for."""
     from dataclasses import fields
 
     from pushplan.evaluation.stress_testing import CONDITIONS
@@ -190,6 +190,6 @@ def condition_facts(name: str) -> dict[str, str]:
 _KINDS: dict[str, dict[str, str]] = tomllib.loads(
     files("pushplan.cli").joinpath("kinds.toml").read_text(encoding="utf-8")
 )
-"""What there is: what each kind is for, and where its names and facts are found."""
+"""Kinds of things to list: what each kind is for, and where its names and facts are found."""
 CHOICES = (*sorted(_KINDS), "all")
 """Words of `pushplan list`."""

@@ -97,7 +97,7 @@ def check_directory(
 
 
 def _takes_files(folder: Path) -> bool:
-    """Whether something can be made in a folder: on some disks only a try can tell."""
+    """Return True if files can be created in a folder: on some disks only a try can tell."""
     try:
         with tempfile.TemporaryDirectory(prefix=".pushplan-", dir=folder):
             return True

@@ -1,4 +1,4 @@
-"""How far a batch of jobs is: a bar on a terminal, else lines for a log."""
+"""Progress of a batch of jobs: a bar on a terminal, else lines for a log."""
 
 from __future__ import annotations
 

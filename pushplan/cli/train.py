@@ -68,7 +68,7 @@ def _config(options: argparse.Namespace) -> TrainingConfig:
 
 
 def _command(options: argparse.Namespace, config: TrainingConfig) -> str:
-    """What starts this training again."""
+    """Return the command line that starts this training again."""
     words = ["pushplan", "train", options.algorithm]
     for name in ("task", "variant", "config", "out"):
         if (value := getattr(options, name)) is not None:
