@@ -20,7 +20,7 @@ from pushplan.compiled.fingerprint import fingerprint, source_digest
 from pushplan.compiled.pipeline import rebuilt, reduced
 from pushplan.files.file_locks import is_locked, take_lock
 
-_PATIENCE = 300.0  # how long a process waits for another that compiles the same kernel [s]
+_PATIENCE = 300.0  # time that a process waits for another that compiles the same kernel [s]
 _POLL = 0.05  # [s]
 
 
@@ -75,12 +75,12 @@ class KernelCache(NullCache):
             self._lock = None
 
     def holds_current(self) -> bool:
-        """Whether something is kept for the code as it is now, for any types of arguments."""
+        """Return True if the cache has a kernel of the current code, for any types of arguments."""
         pattern = f"{self._stem}.{source_digest(self._kernel)[:12]}.*.nbc"
         return any(next(folder.glob(pattern), None) for folder in self._folders.read)
 
     def is_locked(self) -> bool:
-        """Whether a process holds its place, to compile it."""
+        """Return True if a process holds the kernel's lock, to compile it."""
         folder = self._folders.write
         return folder is not None and is_locked(folder / f"{self._stem}.lock") is True
 

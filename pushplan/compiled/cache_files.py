@@ -20,7 +20,7 @@ _damaged: set[Path] = set()  # folders that are known to hold damaged files
 
 
 class Folders(NamedTuple):
-    """Where kernels are kept."""
+    """Folders of the kernel cache."""
 
     read: tuple[Path, ...]  # Folders that are looked through, in order
     write: Path | None  # The one that is written to, None if none can be
