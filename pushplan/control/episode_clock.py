@@ -29,7 +29,7 @@ class EpisodeClock:
         """Forget the episode."""
         self._seen: World | None = None
         self.command = Twist(0.0, 0.0)
-        """What was sent last."""
+        """Command that was sent last."""
         self.held = self._period
         """Time from the snapshot before the present one to that [s]."""
 

@@ -33,7 +33,7 @@ class _Done(Generic[T]):
 
 
 class ExpectedTime:
-    """How long the next planning call will take, by the last ones."""
+    """Estimate of the duration of the next planning call, from the last ones."""
 
     def __init__(self) -> None:
         self._took: deque[float] = deque(maxlen=_REMEMBERED)
@@ -43,7 +43,7 @@ class ExpectedTime:
         self._took.append(seconds)
 
     def of(self, stop: Stop | None) -> float:
-        """What the slowest of the last calls took [s], or else the budget; 0 without either."""
+        """Return the longest of the last calls, within the budget [s]; else the budget, or 0."""
         budget = math.inf if stop is None else stop.seconds
         if self._took:
             return min(budget, max(self._took))
@@ -95,7 +95,7 @@ class SimulatedExecutor:
         self.spent = 0.0
 
     def expected(self, stop: Stop | None) -> float:
-        """What the last calls took, or else the budget of the rule [s]."""
+        """Return the duration of the last calls, or else the budget of the rule [s]."""
         return self._factor * self._took.of(stop) if self._factor else 0.0
 
     def submit(

@@ -28,7 +28,7 @@ _PATIENCE = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Legs(ArrayRecord):
-    """Where to drive, leg by leg.
+    """Legs of a path that is driven straight, with turns on the spot between them.
 
     Args:
         points: (N, 2) where each leg ends [m], world frame.
@@ -182,7 +182,7 @@ class LegFollower:
         return None
 
     def _is_reached(self, distance: float, bearing: float) -> bool:
-        """Whether a leg is over, from what is left of it."""
+        """Return True if a leg is over, by the distance and the bearing to its end."""
         size = self._robot.circumscribed_radius
         behind = not self._turning and bearing > 0.5 * math.pi
         passed = behind and distance < max(_PASSED * size, 3.0 * self._near)
@@ -190,7 +190,7 @@ class LegFollower:
         return distance <= self._near or passed or beside
 
     def _is_aimed(self, error: float, time: float) -> bool:
-        """Whether a turn comes no nearer to its heading, and is near enough."""
+        """Return True if a turn comes no nearer to its heading, and is near enough."""
         return not self._aiming.update(error, time) and error < _ASTRAY
 
     def _turn(self, error: float, seconds: float) -> Twist:

@@ -1,4 +1,4 @@
-"""Whether a robot gets on, in metres and seconds, whatever the control rate."""
+"""Progress checkers in metres and seconds, independent of the control rate."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from pushplan.motion.recovery_path import recovery_path
 from pushplan.world import Drive, GoalDisc, Movables, StaticMap, Twist, World, box_delivery_robot
 from pushplan.world.checks import FloatArray
 
-# how far ahead walls are looked for [circumscribed radii], and how often
+# distance ahead in which walls are looked for [circumscribed radii], and how often
 _LOOK = 0.3
 _POSES = 3
 _DEEPER = 1e-3  # by how much the robot may get deeper into a wall [circumscribed radii]
@@ -75,7 +75,7 @@ class Recovery:
         return self._path.command(world.robot_pose, world.time, held)
 
     def _is_closed(self, pose: FloatArray, way: Twist) -> bool:
-        """Whether a way leads deeper into what is static than the robot is."""
+        """Return True if a motion leads deeper into static obstacles than the robot is."""
         size = self._shape.radius
         here = np.array(pose)
         there = np.empty(3)

@@ -49,7 +49,7 @@ class Retreat:
         self._ways = [way for way in commands if way.linear or way.angular]
         self._stall = StallChecker(robot, _PATIENCE)
         self.got_away = False
-        """Whether it has got away by the distance."""
+        """True once the robot has retreated by the distance."""
 
     def command(self, pose: FloatArray, time: float, held: float) -> Twist | None:
         """The velocity to drive now; None when it has got away, or there is no way.

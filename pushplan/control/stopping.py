@@ -1,4 +1,4 @@
-"""Where a robot gets to before it stands."""
+"""Path of a robot until it has come to a stop."""
 
 from __future__ import annotations
 

@@ -9,14 +9,14 @@ import numpy as np
 from pushplan.world import Plan, Stage
 from pushplan.world.checks import FloatArray
 
-_NEAR = 0.005  # what may be left of a stage that another one follows [windows]
+_NEAR = 0.005  # length of a stage that may be left when the next one begins [windows]
 _AWAY = 0.25  # a robot that is farther from where it turns has turned [windows]
 ALIGNED = math.radians(2.0)
-"""What may be left of a turn on the spot [rad]."""
+"""Heading error at which a turn on the spot is finished [rad]."""
 
 
 class Progress:
-    """How far along a plan the robot is; never jumps to another branch of the same path.
+    """Position of the robot along its plan; never jumps to another branch of the same path.
 
     It goes from stage to stage (`pushplan.world.Plan.stages`): a robot that turns on the spot gets
     on in its heading, and where it goes back along the same path it does not get back before it
@@ -59,7 +59,7 @@ class Progress:
 
     @property
     def is_last(self) -> bool:
-        """Whether no other stage follows the present one."""
+        """True if no other stage follows the present one."""
         return self._at == len(self._stages) - 1
 
     def _get_on(self, plan: Plan, stage: Stage, pose: FloatArray) -> bool:

@@ -14,9 +14,9 @@ from pushplan.world import Twist, World
 from pushplan.world.checks import FloatArray
 
 _AHEAD = (1.0, 0.5, 0.25, 0.0)
-"""Where circles are tried, that far straight ahead [circumscribed radii]."""
+"""Distances straight ahead at which circles are tried [circumscribed radii]."""
 _TURNS = (0.0, 0.5, -0.5, 1.0, -1.0)
-"""Where none fits: turn rates of the arcs, as fractions of the greatest; of equals the first."""
+"""Turn rates of the arcs tried where no circle fits, as fractions of the greatest; first wins."""
 _SPACING = 0.15  # distance between the poses that are looked at [circumscribed radii]
 
 
@@ -41,7 +41,7 @@ def waiting_twist(world: World) -> Twist:
     step = min(_SPACING * shape.radius, circle / 16.0)
 
     def clear(twist: Twist, length: float, ahead: float = 0.0) -> float:
-        """How far an arc is clear, up to ``length``, that begins straight ahead of the robot."""
+        """Return the clear length of an arc, up to ``length``, that begins straight ahead."""
         turn = step * twist.angular / twist.linear
         first = math.ceil(ahead / step)
         most = math.ceil((ahead + length) / step)
@@ -67,7 +67,7 @@ def _clear_steps(
     at: FloatArray,  # (3,) where it begins; ends where it touches
     scratch: FloatArray,  # (V, 2) memory for the corners
 ) -> int:
-    """How many steps the robot can go, the first ones straight, before it touches a wall."""
+    """Return the number of steps, the first ones straight, that the robot can go before a wall."""
     for done in range(most):
         arc_step(at, step, turn if done >= first else 0.0, at)
         if not is_free(at, shape, walls, scratch):

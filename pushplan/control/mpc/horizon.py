@@ -1,4 +1,4 @@
-"""What predictive controllers share: track, time grid, bounds, programs about the last solution."""
+"""Track, time grid, bounds and programs about the last solution, for predictive controllers."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ SENT = 256
 
 
 class CommandLimits(NamedTuple):
-    """What a robot can do."""
+    """Speed, turn-rate and acceleration limits of a robot."""
 
-    constant: bool  # Whether it always drives at max_speed
+    constant: bool  # True if it always drives at max_speed
     min_speed: float
     max_speed: float
     max_turn_rate: float
@@ -245,5 +245,5 @@ def remember(horizon: Horizon, time: float, over: float) -> None:
 
 @kernel
 def _followed(sent: FloatArray, count: int, i: int, over: float) -> bool:
-    """Whether the command after one was sent by ``over`` [s]; never so for the last."""
+    """Return True if the command after one was sent by ``over`` [s]; never so for the last."""
     return i + 1 < count and sent[i + 1, 0] < over

@@ -32,8 +32,8 @@ from pushplan.control.mpc.tracking_kernels import (
 from pushplan.geometry.angles import wrap_angle
 from pushplan.world.checks import FloatArray
 
-_BACK = 0.25  # how far the place on the path may move back from one call to the next [R]
-_WINDOW = 2.0  # how far ahead of the last place the next one is looked for [R]
+_BACK = 0.25  # greatest move back of the place on the path from one call to the next [R]
+_WINDOW = 2.0  # distance ahead of the last place in which the next one is looked for [R]
 _TURN_STOPPED = 0.25 * np.pi
 _TURN_DRIVING = 0.5 * np.pi
 """Heading errors from which a robot turns towards the path first [rad]."""
@@ -126,7 +126,7 @@ def finish_step(
     pose: FloatArray,
     time: float,
     held: float,
-    solved: bool,  # whether the nominal commands are a solution
+    solved: bool,  # True if the nominal commands are a solution
     out: FloatArray,
 ) -> None:
     """Fill the command: of the solution, or what is nearest to it without one."""

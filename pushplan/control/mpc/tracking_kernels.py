@@ -33,7 +33,7 @@ class Tuning(NamedTuple):
     max_speed: float
     max_turn_rate: float
     max_acceleration: float
-    stops: bool  # Whether the robot stops at the end of the path
+    stops: bool  # True if the robot stops at the end of the path
     optimise_speed: bool
     heading_weight: float
     turn_weight: float
