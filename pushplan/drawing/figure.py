@@ -221,7 +221,7 @@ def _draw(axes: Any, panel: Panel, box: FloatArray, inches: float) -> None:
 
 
 def _handle(entry: Entry) -> Any:
-    """What stands beside the label in the legend."""
+    """Return the symbol beside a label in the legend."""
     if entry.line:
         style: Any = (0, (3, 2)) if entry.dashed else "-"
         line = need("matplotlib.lines").Line2D

@@ -1,4 +1,4 @@
-"""What the colours of a picture stand for."""
+"""Legend of the colours of a picture."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ class Palette:
     """Colours of what is drawn; pairs are a fill and an edge."""
 
     floor: Color = "#faf9f6"  # the ground
-    wall: Color = "#545458"  # what is static
+    wall: Color = "#545458"  # static obstacles
     robot: Color = "#0072b2"  # the chassis
     robot_edge: Color = "#00426e"  # outline of the robot
     bumper: Color = "#263242"  # its other parts
@@ -23,9 +23,9 @@ class Palette:
     wheeled: tuple[Color, Color] = ("#e2c08c", "#96703e")  # objects on casters
     fixed: tuple[Color, Color] = ("#7e7a78", "#484646")  # objects held not to move
     box_edge_px: float = 1.5  # width of their edges at 600 px
-    ghost: Color = "#d6a074"  # where objects were
-    prediction: Color = "#cc79a7"  # where objects will be
-    goal: tuple[Color, Color] = ("#ceecde", "#009e73")  # where something has to go
+    ghost: Color = "#d6a074"  # earlier places of objects
+    prediction: Color = "#cc79a7"  # predicted places of objects
+    goal: tuple[Color, Color] = ("#ceecde", "#009e73")  # goal of the robot or of objects
     plan: Color = "#d55e00"  # the planned path
     trail: Color = "#56b4e9"  # the path so far
     text: Color = "#28282c"  # letters

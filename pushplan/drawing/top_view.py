@@ -110,7 +110,7 @@ def draw_moving(
 
 
 def view_bounds(world: World, size_px: int, view: float | None) -> Bounds:
-    """What of the world is shown: x_min, y_min, x_max, y_max [m]."""
+    """Return the part of the world that is shown: x_min, y_min, x_max, y_max [m]."""
     box = _with_walls(world.static)
     low = box[:2].copy()
     high = box[2:].copy()
