@@ -27,7 +27,7 @@ class ActionMode(ABC):
     size: ClassVar[int]
     """Number of elements of an action."""
     takes_velocities: ClassVar[bool] = True
-    """Whether a `Twist` or `WheelSpeeds` can be encoded."""
+    """True if a `Twist` or `WheelSpeeds` can be encoded."""
 
     def __init__(self, task: Task) -> None:
         self.robot = task.robot
@@ -73,7 +73,7 @@ class ActionMode(ABC):
         return self.read(action).astype(np.float32)
 
     def afterwards(self, command: Twist) -> Twist:
-        """What the robot does after an action that ended with ``command``, until the next."""
+        """Return the velocity of the robot after an action that ended with ``command``."""
         return command
 
     @abstractmethod

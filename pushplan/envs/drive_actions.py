@@ -14,7 +14,7 @@ from pushplan.world import InvalidInputError, RobotModel, Twist, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.outline import transform
 
-_ESCAPES = 2  # how often one action makes room for a turn
+_ESCAPES = 2  # number of times that one action makes room for a turn
 
 
 def _motion(robot: RobotModel, points: FloatArray, period: float) -> Motion:

@@ -79,6 +79,6 @@ def make_vector(
 
 
 def make_env(*, task: str, **options: Any) -> PushEnv:
-    """What ``gymnasium.make`` calls: variations are keyword arguments beside those of `PushEnv`."""
+    """Make an environment for ``gymnasium.make``; takes variations beside options of `PushEnv`."""
     own = {name: options.pop(name) for name in _OWN if name in options}
     return PushEnv(task=task, variations=options, **own)

@@ -151,7 +151,7 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
 
     @property
     def observation_builder(self) -> ObservationBuilder:
-        """What makes the observations."""
+        """Builder of the observations."""
         return self._builder
 
     def warm_up(self) -> None:
@@ -182,7 +182,7 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
 
     @property
     def trace(self) -> Trace:
-        """What moved in the last step, at the control rate or finer; the start after a reset."""
+        """Motion during the last step, at the control rate or finer; the start after a reset."""
         if self._trace is None:
             raise EpisodeOverError("there is no trace yet: call reset() first")
         return self._trace
@@ -321,7 +321,7 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         )
 
     def _stands_for(self, command: Twist, periods: float) -> float:
-        """How long a command stands [s] that may stand for some control steps.
+        """Return the duration of a command that may last several control steps [s].
 
         Long where the robot touches nothing; otherwise the robot may be held, or an object leave.
         """

@@ -47,7 +47,7 @@ def goal_kind(task: str, variations: Mapping[str, object] | None = None) -> str 
 
 
 def variation_names(task: str) -> set[str]:
-    """What may depart from the presets of a task.
+    """Return the names of the presets of a task that can be varied.
 
     Raises:
         UnknownNameError: if there is no such task.

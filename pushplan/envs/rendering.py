@@ -1,4 +1,4 @@
-"""What an environment shows: a drawing, the simulator's own camera, or a window."""
+"""Pictures of an environment: a drawing, the simulator's own camera, or a window."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from pushplan.world import World
 
 
 class RolloutInteraction:
-    """What a simulator says that sweeping the robot along a path does.
+    """Interaction model that asks a simulator what sweeping the robot along a path does.
 
     Args:
         simulator: name of the simulator.

@@ -12,7 +12,7 @@ from pushplan.world.checks import ArrayRecord, FloatArray, frozen
 
 @dataclass(frozen=True, eq=False)
 class Trace(ArrayRecord):
-    """What moved during one stretch of time. The instant at which it began is not in it.
+    """Motion of robot and objects during a stretch of time, without the instant at which it began.
 
     Traces of consecutive stretches therefore join end to end without a repeated instant.
 

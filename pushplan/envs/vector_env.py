@@ -94,7 +94,7 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
         )
         ends = [n * self.num_envs // workers for n in range(workers + 1)]
         self._shares = [slice(first, end) for first, end in pairwise(ends)]
-        self._pending: dict[Future[Any], int] = {}  # what workers owe, by the order of requests
+        self._pending: dict[Future[Any], int] = {}  # answers of workers due, in order of requests
         self._pools = [
             ProcessPoolExecutor(
                 1,
@@ -129,7 +129,7 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
     def _reset_arguments(
         self, seed: int | Sequence[int | None] | None, options: Mapping[str, Any] | None
     ) -> list[Any]:
-        """What each worker needs to reset its environments."""
+        """Return the arguments with which each worker resets its environments."""
         count = self.num_envs
         given = dict(options or {})
         if seed is None or isinstance(seed, int | np.integer):
@@ -187,7 +187,7 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
     def recv(
         self,
     ) -> _Batch:
-        """What `step` returns, for the environments of the first worker that is ready.
+        """Return the result of `step` for the environments of the first worker that is ready.
 
         Which worker that is depends on the machine, an episode of an environment does not.
 
@@ -241,7 +241,7 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
         self._pending[self._pools[n].submit(_step, np.asarray(actions))] = n
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
-        """What a method of every environment returns, or the value of an attribute."""
+        """Call a method of every environment, or read an attribute, and return the answers."""
         answers = self._ask(_call, [(name, args, kwargs)] * self.workers)
         return tuple(value for values in answers for value in values)
 

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from pushplan.world import MissingDependencyError
 
 TICK = 0.02
-"""How often a waiting window looks at what the person does [s]."""
+"""Interval at which a waiting window handles input [s]."""
 
 
 def has_display() -> bool:
-    """Whether a window can be expected to open here."""
+    """Return True if a window can be expected to open here."""
     if importlib.util.find_spec("tkinter") is None or importlib.util.find_spec("_tkinter") is None:
         return False
     if sys.platform.startswith("linux"):
@@ -88,7 +88,7 @@ class Window:
 
     @property
     def closed(self) -> bool:
-        """Whether the window is gone."""
+        """True once the window is closed."""
         return self._root is None
 
     def show(self, frame: NDArray[np.uint8]) -> None:

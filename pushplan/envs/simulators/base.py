@@ -1,4 +1,4 @@
-"""What every simulator does. It knows bodies; tasks, goals and rewards mean nothing to it."""
+"""Base class of simulators. They simulate bodies and know no tasks, goals or rewards."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Solids(CheckedFields):
 
 @dataclass(frozen=True)
 class Materials(CheckedFields):
-    """How bodies grip, roll and float, in terms that every engine understands.
+    """Friction, rolling and drag of bodies, in terms that every engine understands.
 
     Args:
         robot_object: friction coefficient between the robot's bumper and an object.
@@ -67,7 +67,7 @@ class SimulatorState(ArrayRecord):
     robot_twist: FloatArray  # (3,) velocity in the world frame [m/s, m/s, rad/s]
     object_poses: FloatArray  # (K, 3)
     object_twists: FloatArray  # (K, 3)
-    # what else the engine has to remember, in an order of its own
+    # further state of the engine, in an order of its own
     hidden: FloatArray = field(default_factory=lambda: frozen(np.zeros(0)))
 
 
@@ -83,10 +83,10 @@ class Simulator(ABC):
     name: ClassVar[str]
     """As in the registry of simulators."""
     needs_solids: ClassVar[bool] = False
-    """Whether the engine has a third dimension, so that `Materials.solids` must be there."""
+    """True if the engine has a third dimension, so that `Materials.solids` must be there."""
     has_camera: ClassVar[bool] = False
     is_exact: ClassVar[bool] = False
-    """Whether the robot follows a command exactly unless it is held."""
+    """True if the robot follows a command exactly unless something blocks it."""
 
     _world: World
     _held = _touched = False
@@ -104,7 +104,7 @@ class Simulator(ABC):
         """
 
     def clear_for(self, command: Twist, limit: float) -> float:
-        """How long [s], at most ``limit``, the robot certainly touches nothing at this velocity.
+        """Return a time [s], at most ``limit``, in which the robot certainly touches nothing.
 
         Meanwhile nothing but the robot moves. An engine that cannot tell says 0.
         """
@@ -139,7 +139,7 @@ class Simulator(ABC):
         return SimulatorState(time, *(frozen(part) for part in parts))
 
     def _hidden(self) -> FloatArray:
-        """What the engine has to remember beside poses and twists."""
+        """Return the state that the engine keeps beside poses and twists."""
         return np.zeros(0)
 
     @abstractmethod
@@ -171,12 +171,12 @@ class Simulator(ABC):
 
     @property
     def touched_static(self) -> bool:
-        """Whether the robot's footprint touched something static during the last step."""
+        """True if the robot's footprint touched something static during the last step."""
         return self._touched
 
     @property
     def held(self) -> bool:
-        """Whether the robot was kept from moving as commanded during the last step."""
+        """True if the robot was kept from moving as commanded during the last step."""
         return self._held
 
     def _without(self, object_ids: Sequence[int]) -> tuple[World, IntArray]:

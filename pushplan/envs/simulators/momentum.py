@@ -1,4 +1,4 @@
-"""What moving bodies keep of their velocity while nothing pushes them, in the plane."""
+"""Velocity that moving bodies keep while nothing pushes them, in the plane."""
 
 from __future__ import annotations
 

@@ -70,7 +70,7 @@ class MujocoBodies:
         self._options = options
         self._gap = rest_gap(movables.radii)
         self.accelerations = math.inf, math.inf  # up to speed well within a step
-        """What the robot's motors can do on free ground: [m/s²] and [rad/s²]."""
+        """Greatest accelerations of the robot's motors on free ground: [m/s²] and [rad/s²]."""
         if self.afloat:
             limits = self.model.actuator_forcerange[:, 1]
             inertia = self.model.body("robot").inertia.max()
@@ -172,7 +172,7 @@ class MujocoBodies:
         return np.concatenate([self.qpos, self.qvel, self._asleep])
 
     def hidden_without(self, gone: IntArray) -> FloatArray:
-        """What `hidden` would return without some of the objects, given by index."""
+        """Return `hidden` as it would be without some of the objects, given by index."""
         kept = np.delete(np.arange(self.count), gone)
         positions = self._objects_q[kept]
         velocities = self._objects_v[kept]
@@ -270,7 +270,7 @@ class MujocoBodies:
 
     @property
     def touches(self) -> tuple[bool, bool]:
-        """Whether the hull touched something static in the engine's last step, and anything."""
+        """Flags of the hull in the engine's last step: touched something static, touched at all."""
         return bool(self._touch[0] > 0.0), bool(self._touch[1] > 0.0)
 
     def check(self) -> None:

@@ -29,7 +29,7 @@ _HOLDING = 1e7  # damping of a fixed object over its mass [1/s]
 _WHEEL_MASS = 0.03  # of one wheel, in units of the robot's mass
 _CASTER = 0.25  # radius of the caster's ball, in units of the wheel radius
 _CLEARANCE = 0.35  # height of the chassis above ground, in units of the wheel radius
-_BALANCE = 0.4  # where the centre of mass is on the way from the axle to the caster
+_BALANCE = 0.4  # place of the centre of mass on the way from the axle to the caster
 _MASS_HEIGHT = 0.25  # of the centre of mass, in units of the robot's height
 
 

@@ -1,4 +1,4 @@
-"""How robots on wheels and ships look to MuJoCo's camera; nothing here touches or weighs."""
+"""Appearance of wheeled robots and ships in MuJoCo's camera; nothing here touches or weighs."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def add_shell(spec: Any, robot: RobotModel, solids: Solids) -> None:
 
 
 def add_superstructure(spec: Any, robot: RobotModel, solids: Solids) -> None:
-    """What stands on the hull of a ship: a deck, the house with its bridge forward, a funnel.
+    """Add the superstructure of a ship: a deck, the house with its bridge forward, a funnel.
 
     Args:
         spec: the model, in which the ship's frame is at the waterline.

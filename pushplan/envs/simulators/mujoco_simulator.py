@@ -116,7 +116,7 @@ class MujocoSimulator(Simulator):
         return stored, touched
 
     def _fell_short(self, poses: FloatArray, command: Twist, interval: float) -> bool:
-        """Whether the robot's speed or its turn rate is neither what was asked nor rising.
+        """Return True if the robot's speed or turn rate is neither as commanded nor rising.
 
         Args:
             poses: (N, 3) of the robot, one interval apart; both halves are compared.

@@ -16,7 +16,7 @@ from pushplan.world.checks import BoolArray, FloatArray, IntArray
 from pushplan.world.outline import outward_normals, transform_outlines, unflatten
 
 AWAKE = -1 - 10
-"""What MuJoCo writes for a tree that has just been woken: -(1 + mjMINAWAKE)."""
+"""Value that MuJoCo writes for a tree that has just been woken: -(1 + mjMINAWAKE)."""
 TILT = 1e-4
 """Square of half the sine of the greatest tilt at which an object may rest."""
 

@@ -51,7 +51,7 @@ def _step_of(space: pymunk.Space) -> Callable[[float], None]:
 
 
 class _Contacts:
-    """What the collision callbacks write. They hold this and not the space: no reference cycle."""
+    """Record of the collision callbacks. They hold this and not the space: no reference cycle."""
 
     def __init__(self) -> None:
         self.clear()
@@ -200,7 +200,7 @@ class PymunkBodies:
 
     @property
     def static_contacts(self) -> int:
-        """How many pairs of a moving and a static shape touch."""
+        """Number of touching pairs of a moving and a static shape."""
         return self.contacts.object_static + self.contacts.robot_static
 
     @property

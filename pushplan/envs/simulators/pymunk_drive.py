@@ -60,7 +60,7 @@ class PymunkOptions(CheckedFields):
 
 
 class _Moved(enum.Enum):
-    """What came of a substep."""
+    """Part of the wanted motion that a substep has made."""
 
     ALL = enum.auto()
     SOME = enum.auto()
@@ -87,7 +87,7 @@ class PymunkDriver:
         self, bodies: PymunkBodies, robot: RobotModel, options: PymunkOptions, size: float
     ) -> None:
         self.held = False
-        """Whether the robot was kept from moving as commanded in the last run."""
+        """True if the robot was kept from moving as commanded in the last run."""
         self._bodies = bodies
         self._radius = robot.circumscribed_radius
         self._limit = options.tolerance * size
@@ -98,7 +98,7 @@ class PymunkDriver:
 
     @property
     def touched(self) -> bool:
-        """Whether the robot touched something static in the last run."""
+        """True if the robot touched something static in the last run."""
         return self._bodies.contacts.robot_touched
 
     def run(
@@ -240,7 +240,7 @@ class PymunkDriver:
         return self._sound(allowed)
 
     def _sound(self, allowed: float) -> bool:
-        """Whether no overlap beyond ``allowed`` [m] has come of the last substep."""
+        """Return True if the last substep caused no overlap beyond ``allowed`` [m]."""
         bodies = self._bodies
         measured = bodies.static_contacts > 0
         depth = bodies.depth if measured else 0.0

@@ -157,7 +157,7 @@ class PymunkSimulator(Simulator):
         return found[:, 0, :3], paths
 
     def clear_for(self, command: Twist, limit: float) -> float:
-        """How long the robot certainly touches nothing, as `Simulator.clear_for`."""
+        """Return a time in which the robot certainly touches nothing, as `Simulator.clear_for`."""
         held = self.options.holds_direction
         return self._clear_time(self._rows[0, 2], command.linear, command.angular, held, limit)
 
@@ -184,7 +184,7 @@ class PymunkSimulator(Simulator):
         return np.ascontiguousarray(self._rows[1:, :3])
 
     def _substeps(self, travel: float, duration: float) -> float:
-        """How many substeps a step needs in which some point moves by ``travel`` [m]."""
+        """Return the number of substeps of a step in which some point moves by ``travel`` [m]."""
         decay = self._momentum.fastest_decay(self._rows[:, 3:])
         by_travel = travel / (self.options.travel * self._size)
         return max(by_travel, duration * decay / self.options.decay)

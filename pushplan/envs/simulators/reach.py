@@ -1,4 +1,4 @@
-"""Which objects a step of the robot can concern, so that a simulator can leave out the rest."""
+"""Objects that a step of the robot can affect, so that a simulator can leave out the rest."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ class Shapes(NamedTuple):
     """Outlines of the robot and the objects, body frames [m]."""
 
     parts: FloatArray  # corners of the robot's footprint
-    part_offsets: IntArray  # where each part starts
+    part_offsets: IntArray  # start of each part
     vertices: FloatArray  # corners of the objects
-    offsets: IntArray  # where each object starts
+    offsets: IntArray  # start of each object
     radii: FloatArray  # (K,) their circumscribed radii
 
 
 @kernel(allocates=True)
 def within_reach(
     robot: FloatArray,  # (3,) pose of the robot
-    reach: float,  # how far any of its points moves in the step [m]
+    reach: float,  # greatest distance that one of its points moves in the step [m]
     shapes: Shapes,
     rows: FloatArray,  # (K, 3) poses of the objects
     speeds: FloatArray,  # (K,) how far each object would move by itself in the step [m]
@@ -76,12 +76,12 @@ def clear_time(
     course: float,  # in which direction of the world it begins to go [rad]
     linear: float,  # its speed in this direction [m/s]
     angular: float,  # its turn rate [rad/s]
-    holds: bool,  # whether it keeps its course; else this turns with it
+    holds: bool,  # True if it keeps its course; else this turns with it
     limit: float,  # no longer than this [s]
     margin: float,  # distance that counts as contact [m]
     shapes: Shapes,
     rows: FloatArray,  # (K, 3) poses of the objects
-    obstacles: Obstacles,  # what is static
+    obstacles: Obstacles,  # static obstacles
 ) -> float:
     """Time [s] for which a robot that drives an arc certainly touches nothing.
 

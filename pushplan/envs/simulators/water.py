@@ -61,7 +61,7 @@ def _cubed_distance(ax: float, ay: float, bx: float, by: float) -> float:
 
 @dataclass(frozen=True)
 class Water(CheckedFields):
-    """How water brakes bodies: ``F = -(b + c |v|) v``, and likewise about the vertical axis.
+    """Drag of water on bodies: ``F = -(b + c |v|) v``, and likewise about the vertical axis.
 
     Objects are flat floes. Water resists them at their edges (form drag) and underneath (skin
     drag), both quadratic. It is never quite still itself: against an ambient motion u0, the drag
@@ -74,11 +74,11 @@ class Water(CheckedFields):
     field_prefix = "water "
 
     density: PositiveFloat = 1025.0  # of the water [kg/m³]
-    object_draught: NonNegativeFloat = 1.05  # how deep an object reaches [m]
+    object_draught: NonNegativeFloat = 1.05  # draught of an object [m]
     object_form_drag: NonNegativeFloat = 1.1  # C_d of an edge, on mean width times draught
     object_skin_drag: NonNegativeFloat = 0.0055  # C_w of the underside, ``F = density C_w area v²``
     ambient_speed: NonNegativeFloat = 0.05  # u0 [m/s]
-    robot_draught: NonNegativeFloat = 5.0  # how deep the robot reaches [m]
+    robot_draught: NonNegativeFloat = 5.0  # draught of the robot [m]
     # time constant of the robot's speed when nothing drives it [s]
     robot_surge_time: PositiveFloat = 88.0
     robot_yaw_time: PositiveFloat = 11.6  # of its turn rate [s]

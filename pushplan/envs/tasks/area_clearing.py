@@ -110,7 +110,7 @@ class AreaClearingTask(ManipulationTask):
 
 
 def open_edges(static: StaticMap, polygon: FloatArray, size: float) -> BoolArray:
-    """Which edges of an area a box can be pushed out across.
+    """Find the edges of an area across which a box can be pushed out.
 
     An edge is open if somewhere along it a box that has just left, with a side on the edge, would
     overlap nothing static and lie within the map's bounds.

@@ -1,4 +1,4 @@
-"""What every task does. It names quantities of a `World`; engines mean nothing to it."""
+"""Base class of tasks. A task uses only quantities of a `World`, so any engine can run it."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _FRICTIONS = {
 
 @dataclass(frozen=True)
 class StepOutcome:
-    """What one step of an episode was worth.
+    """Reward and end of one step of an episode.
 
     Args:
         reward: as the task defines it.
@@ -99,9 +99,9 @@ class Task(ABC):
     reach: float
     """No coordinate and no distance that is observed exceeds this [m]."""
     slowness: float
-    """How much longer an episode may take than the preset allows, for a slower robot."""
+    """Factor by which an episode may last longer than the preset allows, for a slower robot."""
     heading_step: float = 0.0
-    """How far a heading action drives [m], where the task has it."""
+    """Distance that a heading action drives [m], where the task has it."""
     waypoint_window: float = 0.0
     """Side of the square around the robot that waypoint actions reach [m], where it has them."""
 
@@ -184,7 +184,7 @@ class Task(ABC):
 
     @property
     def _longest(self) -> float:
-        """How long an episode lasts unless said otherwise [s]: longer for a slower robot."""
+        """Default time limit of an episode [s]: longer for a slower robot."""
         seconds: float = self.preset.max_steps * self.preset.control_step * self.slowness
         return seconds
 
@@ -204,7 +204,7 @@ class Task(ABC):
         """
 
     def told(self, world: World) -> World:
-        """What a policy is told of a scene: all of it, unless the task says otherwise.
+        """Return the scene that a policy gets to see: all of it, unless the task says otherwise.
 
         Args:
             world: the scene as the simulator has it.
@@ -212,7 +212,7 @@ class Task(ABC):
         return world
 
     objects_leave: bool = False
-    """Whether objects can leave the floor, so that `leaving` has to be asked."""
+    """True if objects can leave the floor, so that `leaving` has to be asked."""
 
     def leaving(self, ids: IntArray, poses: FloatArray) -> IntArray:
         """Ids of the objects that leave the floor now; asked after every control step.
@@ -227,7 +227,7 @@ class Task(ABC):
     def score(
         self, before: World, after: World, *, work: float, touched_static: bool
     ) -> StepOutcome:
-        """What the step from ``before`` to ``after`` was worth, and whether the episode ends.
+        """Score the step from ``before`` to ``after``, and tell whether the episode ends.
 
         Args:
             before: the world when the step began.
@@ -271,5 +271,5 @@ class Task(ABC):
 
 
 def drive_of(action: str) -> Drive:
-    """How a robot moves that is commanded by an action mode."""
+    """Return the drive of a robot that is commanded by an action mode."""
     return Drive.CONSTANT_SPEED if action == "turn_rate" else Drive.DIFFERENTIAL

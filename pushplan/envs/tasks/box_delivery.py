@@ -77,7 +77,7 @@ class BoxDeliveryTask(ManipulationTask):
         self._empty = StaticMap.build(polygons=self._walls, bounds=self.bounds)
 
     def _corners(self) -> list[FloatArray]:
-        """What keeps boxes from getting stuck in the corners without receptacle."""
+        """Return the pieces that keep boxes from getting stuck in corners without receptacle."""
         x, y = self.bounds[2:]
         return [
             (np.array([x, y]) - np.array(piece)) * (sx, sy)

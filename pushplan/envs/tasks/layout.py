@@ -1,4 +1,4 @@
-"""Where a scene starts: walls, and square objects on free floor without overlaps."""
+"""Start scenes: walls, and square objects on free floor without overlaps."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _LATTICE_SHIFTS = 16
 _LATTICE_CELLS = 20_000
 _TOUCH_TRIES = 20
 _TOUCH = 1e-6
-"""How near boxes are that touch the robot, as a fraction of their size."""
+"""Distance to the robot at which a box touches it, as a fraction of the box's size."""
 _CORNERS = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
 
 
@@ -49,7 +49,7 @@ class FreeSpace:
     def is_free(
         self, shapes: NDArray[Any], gap: float, keep_off: Sequence[tuple[Any, float]] = ()
     ) -> BoolArray:
-        """Which of some Shapely geometries stay more than ``gap`` [m] off every obstacle.
+        """Check which Shapely geometries stay more than ``gap`` [m] off every obstacle.
 
         Args:
             shapes: the geometries.
@@ -182,7 +182,7 @@ def _moved_off(poses: FloatArray, size: float, body: Any) -> tuple[FloatArray, B
 
 
 def _keeps_off(pose: FloatArray, others: FloatArray, size: float, spacing: float) -> bool:
-    """Whether a square overlaps none of others (N, 3), and their centres keep their spacing."""
+    """Return True if a square overlaps none of others (N, 3), and centres keep their spacing."""
     away = np.hypot(*(others[:, :2] - pose[:2]).T)
     if (away < spacing).any():
         return False

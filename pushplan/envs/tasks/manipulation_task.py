@@ -1,4 +1,4 @@
-"""What Box-Delivery and Area-Clearing have in common: a room, a robot, and boxes to push."""
+"""Common base of Box-Delivery and Area-Clearing: a room, a robot, and boxes to push."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ STILL_REWARD = -0.25
 
 @dataclass(frozen=True, kw_only=True)
 class ManipulationVariations(TaskVariations):
-    """What may depart from a preset; None leaves the preset's value."""
+    """Variations of a manipulation task; None leaves the preset's value."""
 
     layout: str  # name of the layout
     boxes: PositiveInt | None = None  # number of boxes, at least 1
@@ -58,8 +58,8 @@ class ManipulationVariations(TaskVariations):
     # one of `pushplan.world.BUMPERS`, where the robot's can be changed
     bumper: Annotated[str, OneOf(BUMPERS)] | None = None
     bumper_friction: NonNegativeFloat | None = None  # friction coefficient between robot and boxes
-    random_start: bool  # whether the robot's start is random
-    touching: bool | None = None  # whether boxes may start in touch with the robot
+    random_start: bool  # True for a random start of the robot
+    touching: bool | None = None  # True if boxes may start in touch with the robot
     # time without progress after which the episode is cut off [s], whatever the action mode
     idle_limit: PositiveFloat | None = None
 
@@ -74,7 +74,7 @@ class ManipulationVariations(TaskVariations):
 class Reach:
     """The connected free space of a disc-shaped robot around one point."""
 
-    grid: Grid  # where the cells are
+    grid: Grid  # place of the cells
     # (rows, columns) distance of each cell to the nearest place where the robot's centre can be [m]
     distances: FloatArray
 
@@ -96,7 +96,7 @@ class Reach:
         return cls(grid, ndimage.distance_transform_edt(labels != wanted) * resolution)
 
     def within(self, points: FloatArray, distance: float) -> BoolArray:
-        """Which of the points (N, 2) [m] are at most ``distance`` [m] from where the robot fits."""
+        """Check which points (N, 2) [m] are at most ``distance`` [m] from where the robot fits."""
         near: BoolArray = self.distances[_cells(self.grid, points)] <= distance
         return near
 
@@ -132,7 +132,7 @@ class ManipulationTask(Task):
     end: ClassVar[str]
     """The reason for which a successful episode ends."""
     towards: ClassVar[float] = 1.0
-    """How much more a metre towards the goal counts than one away from it."""
+    """Weight of a metre towards the goal, relative to a metre away from it."""
     done_reward: float = 10.0
     back_reward: ClassVar[float] = 0.0
     """For each box that was done and is no longer."""
@@ -196,7 +196,7 @@ class ManipulationTask(Task):
 
     @abstractmethod
     def _layout(self, rng: np.random.Generator) -> tuple[StaticMap, bool]:
-        """What is static, and whether another call may give something else."""
+        """Return the static map, and whether another call may return a different one."""
 
     @abstractmethod
     def _robot_poses(self, rng: np.random.Generator, static: StaticMap) -> FloatArray:
@@ -297,7 +297,7 @@ class ManipulationTask(Task):
         return np.where(np.isinf(found), self._farthest, found)
 
     def _idle(self, world: World, progress: bool) -> bool:
-        """Whether nothing has been achieved for too long, after a step that ended in ``world``."""
+        """Count a step that ended in ``world``; return True after too long without progress."""
         self._idle_actions += 1
         if progress:
             self._idle_actions = 0

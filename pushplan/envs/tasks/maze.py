@@ -59,7 +59,7 @@ def walls(preset: Preset, shape: str) -> StaticMap:
 
 @dataclass(frozen=True, kw_only=True)
 class MazeVariations(TaskVariations):
-    """What may depart from a preset; None leaves the preset's value."""
+    """Variations of the Maze task; None leaves the preset's value."""
 
     task = "maze"
 
@@ -69,10 +69,10 @@ class MazeVariations(TaskVariations):
     # headings of the boxes at the start, ``"aligned"`` with the walls or ``"random"``
     box_yaw: Yaw = "aligned"
     wheeled: Fraction = 0.0  # fraction of the boxes that stand on casters, 0 to 1
-    # whether the robot starts anywhere instead of at the preset's start
+    # True if the robot starts anywhere instead of at the preset's start
     random_start: bool | None = None
-    touching: bool | None = None  # whether boxes may start in touch with the robot
-    # what the testbed's robot carries in front, one of `pushplan.world.BUMPERS`
+    touching: bool | None = None  # True if boxes may start in touch with the robot
+    # bumper in front of the testbed's robot, one of `pushplan.world.BUMPERS`
     bumper: Annotated[str, OneOf(BUMPERS)] | None = None
     bumper_friction: NonNegativeFloat | None = None  # friction coefficient between robot and boxes
     time_limit: PositiveFloat | None = None  # when the episode is cut off [s]

@@ -22,12 +22,12 @@ _ROOMS = 3  # at most
 
 @dataclass(frozen=True, kw_only=True)
 class NamoVariations(TaskVariations):
-    """What may depart from a preset; None leaves the preset's value."""
+    """Variations of the NAMO task; None leaves the preset's value."""
 
     task = "namo"
 
-    layout: Annotated[str, OneOf(tuple(LAYOUTS))] = "one_box"  # how the doors are held
-    # what a policy is told of which boxes do not move: the truth, that all of them move, or the
+    layout: Annotated[str, OneOf(tuple(LAYOUTS))] = "one_box"  # name of the layout of the doors
+    # claim to the policy about which boxes do not move: the truth, that all of them move, or the
     # opposite of the truth
     movability: Annotated[str, OneOf(("known", "unknown", "wrong"))] = "known"
     box_size: PositiveFloat | None = None  # side of a plain box [m]

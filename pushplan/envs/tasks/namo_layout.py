@@ -17,8 +17,8 @@ WALL = 0.25  # half thickness of the walls [units]
 DOOR = 1.0  # half width of a door [units]
 BAR = (0.8, 2.4)  # depth and width of a box that no door lets through [units]
 BAR_PLACE = 1.2  # of its middle before the wall [units]
-SLID = 2.2  # how far a bar goes aside [units]
-THROUGH = 2.8  # how far beyond the wall a box rests that went through [units]
+SLID = 2.2  # distance by which a bar goes aside [units]
+THROUGH = 2.8  # distance beyond the wall at which a box rests that went through [units]
 _CLUTTER = 4  # boxes beside the way
 EDGE = 2.6  # nearest that a door comes to the corner of a room [units]
 

@@ -1,4 +1,4 @@
-"""Whether a start is closed at first, and open after the steps of a proof."""
+"""Proof that a start is closed at first, and open after some pushes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _GAP = 0.02  # least gap between bodies at the start [circumscribed radii]
 
 
 def proves(world: World, opening: Sequence[Opening]) -> bool:
-    """Whether a scene is sound and closed at first, and the steps of an opening open it.
+    """Return True if a scene is sound and closed at first, and the steps of an opening open it.
 
     Every step moves boxes straight along free floor, pushed by a robot that gets behind them, and
     has as much floor as it is wide on its way.
@@ -71,7 +71,7 @@ def _reaches_goal(free: FreeComponents, world: World) -> bool:
 
 
 def _is_sound(world: World, gap: float) -> bool:
-    """Whether no body touches another one, and the robot may turn where it stands."""
+    """Return True if no body touches another one, and the robot may turn where it stands."""
     walls = [shapely.Polygon(polygon) for polygon in world.static.polygons]
     count = len(world.movables)
     boxes = [shapely.Polygon(world.movables.outline_world(k)) for k in range(count)]
@@ -99,7 +99,7 @@ def _swept(world: World, after: World, k: int) -> shapely.Geometry:
 
 
 def _hits(world: World, floor: shapely.Geometry, boxes: Sequence[int]) -> bool:
-    """Whether a piece of floor holds a wall, or a box that is none of ``boxes``."""
+    """Return True if a piece of floor overlaps a wall, or a box that is none of ``boxes``."""
     others = [k for k in range(len(world.movables)) if k not in boxes]
     shapes = [*world.static.polygons, *(world.movables.outline_world(k) for k in others)]
     return any(floor.intersects(shapely.Polygon(shape)) for shape in shapes)

@@ -32,8 +32,8 @@ from pushplan.world.outline import grown_outline, transform
 DONE_REWARD = 10.0
 PROGRESS_REWARD = 150.0
 _LEAN = 0.02
-"""How far a corner may be outside a receptacle, as a fraction of the object's radius: an object
-that leans on a wall overlaps it a little."""
+"""Tolerance by which a corner may be outside a receptacle, as a fraction of the object's radius: an
+object that leans on a wall overlaps it a little."""
 _IMAGE_CHANNELS = ("footprint", "movable", "static", "goal_distance")
 _CELLS = 200
 """Of the goal distance field, along the longer side of the room."""
@@ -51,13 +51,13 @@ PRESETS = read_presets("room")
 
 @dataclass(frozen=True, kw_only=True)
 class RoomVariations(TaskVariations):
-    """What may depart from a preset; None leaves the preset's value."""
+    """Variations of the Room task; None leaves the preset's value."""
 
     task = "room"
 
     # the world, as `pushplan.world.load_world` reads it; a room of 3 m with two boxes if None
     world_file: str | None = None
-    # how far the robot and each object may start from where the file has them, as drawn by the
+    # greatest distance of robot and objects from where the file has them, as drawn by the
     # seed [m]; they are turned by as much at their rims
     spread: NonNegativeFloat = 0.0
     # when the episode is cut off [s]; if None after ten times the shortest way at full speed, for

@@ -27,7 +27,7 @@ from pushplan.world.checks import FloatArray
 from pushplan.world.outline import transform
 
 CONCENTRATION = 0.1
-"""Where none is asked for, and there is no file."""
+"""Concentration of ice where none is asked for, and there is no file."""
 _IMAGE_CHANNELS = ("footprint", "movable", "goal_distance", "heading_line")
 _PIXELS = 150
 _START_TRIES = 500
@@ -39,7 +39,7 @@ PRESETS = read_presets("ship_ice")
 
 @dataclass(frozen=True, kw_only=True)
 class ShipIceVariations(TaskVariations):
-    """What may depart from a preset; None leaves the preset's value."""
+    """Variations of the Ship-Ice task; None leaves the preset's value."""
 
     task = "ship_ice"
 
@@ -48,9 +48,9 @@ class ShipIceVariations(TaskVariations):
     # 0 for ice that is equally likely everywhere, 1 for patches and open water
     clumping: Fraction = 0.6
     channel_length: PositiveFloat | None = None  # with ice to the same distance from its end [m]
-    # how far the goal line lies ahead of the start line [m]
+    # distance of the goal line ahead of the start line [m]
     goal_distance: PositiveFloat | None = None
-    start_x: float | None = None  # where on the start line the ship starts [m]; anywhere if None
+    start_x: float | None = None  # place of the ship on the start line [m]; anywhere if None
     start_heading: float = _UP  # [rad], straight ahead by default
     # ice from a file, as `pushplan.scenarios.load_ice` reads it, instead of random ice
     ice_file: str | None = None

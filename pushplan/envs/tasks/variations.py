@@ -15,7 +15,7 @@ Yaw = Annotated[str, OneOf(("aligned", "random"))]
 
 @dataclass(frozen=True, kw_only=True)
 class TaskVariations(CheckedFields):
-    """What may depart from the presets of every task; None leaves the preset's value."""
+    """Variations that every task has; None leaves the preset's value."""
 
     control_step: PositiveFloat | None = None  # time between two commands [s]
     # greatest speed of the robot [m/s]; that backwards changes with it
