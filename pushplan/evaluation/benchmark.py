@@ -105,7 +105,7 @@ def bench_experiment(
     memory_limit_mb: float | None = MEMORY_MB,
     latency_factor: float | None = None,
 ) -> Experiment:
-    """What `bench` runs; arguments and errors as there."""
+    """Return the experiment that `bench` runs; arguments and errors as there."""
     suites = suites_of(suite, episodes, seed)
     versions = [one.version for one in suites]
     return Experiment(

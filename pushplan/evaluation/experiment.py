@@ -146,7 +146,7 @@ class Experiment:
 
     @property
     def jobs(self) -> list[Job]:
-        """What is run: the policies of a scenario close together."""
+        """Jobs to run, with the policies of a scenario close together."""
         return [
             Job(spec, scenario)
             for suite in self.suites

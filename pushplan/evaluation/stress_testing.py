@@ -34,7 +34,7 @@ UNDISTURBED = "undisturbed"
 
 @dataclass(frozen=True)
 class Condition:
-    """What a policy has to stand.
+    """Disturbances of a stress test, and the scores that a policy has to keep under them.
 
     Args:
         disturbances: of perception, prediction and actuators.
@@ -66,7 +66,7 @@ of four on average; "mass" is what the policy is told over what is true."""
 
 @dataclass(frozen=True)
 class StressRow:
-    """What became of one condition.
+    """Result of a policy under one condition.
 
     Attributes:
         condition: its name.

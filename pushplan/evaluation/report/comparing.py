@@ -43,7 +43,7 @@ NOTE = (
 
 @dataclass(frozen=True)
 class Rule:
-    """What counts as a regression of a column.
+    """Criterion for a regression of a column.
 
     Attributes:
         metric: the column.
@@ -64,7 +64,7 @@ class Rule:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a rule says about one policy in one setting.
+    """Verdict of a rule on one policy in one setting.
 
     Attributes:
         rule: the rule.
@@ -96,7 +96,7 @@ class Verdict:
 
     @property
     def failed(self) -> bool:
-        """Whether a gate closes."""
+        """True if the gate has to fail."""
         return self.verdict in ("regressed", "missing")
 
 

@@ -97,7 +97,7 @@ def is_page(path: Path) -> bool:
 
 
 def page_data(run: StoredRun, replays: Mapping[str, int]) -> dict[str, Any]:
-    """What the scripts of the page read: the rows, column by column, texts as numbers of a list.
+    """Return the rows for the scripts of the page, column by column, texts as indices of a list.
 
     Args:
         run: the rows.

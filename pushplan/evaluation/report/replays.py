@@ -84,7 +84,7 @@ def write_beside(run: StoredRun, rows: Sequence[ResultRow], folder: Path) -> set
 
 
 def _scene(episode: Episode) -> dict[str, Any]:
-    """What does not move, and the outlines of what does."""
+    """Return the static obstacles and the goal, and the outlines of what moves."""
     world = episode.world
     goal = world.goal
     if isinstance(goal, GoalDisc):

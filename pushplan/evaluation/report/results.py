@@ -32,7 +32,7 @@ from pushplan.world.checks import choice, integer
 
 
 class Results(StoredRun):
-    """What a run says: summaries, paired differences, tables and a report."""
+    """Stored run with summaries, paired differences, tables and a report."""
 
     def measure(self, metrics: Sequence[str]) -> list[Table]:
         """Metrics that are no columns, from the stored episodes of jobs that did not fail.

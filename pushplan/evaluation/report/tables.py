@@ -53,7 +53,7 @@ class Table:
     title: str  # one line
     headings: tuple[str, ...]  # one a column
     cells: tuple[tuple[str, ...], ...]  # rows of as many texts
-    note: str = ""  # what the numbers are
+    note: str = ""  # meaning of the numbers
 
 
 SCORE_NOTE = (

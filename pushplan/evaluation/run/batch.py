@@ -36,7 +36,7 @@ Progress = Callable[[int, int, ResultRow | None], None]
 
 _log = logging.getLogger(__name__)
 TRACES = ("all", "failures", "none")
-"""Which recorded episodes are kept: of every job, of those without success, or of none."""
+"""Recorded episodes that can be kept: of every job, of those without success, or of none."""
 _TURN = 20
 """So many jobs of a policy follow each other where policies do not share a process."""
 

@@ -16,7 +16,7 @@ from pushplan.imports.on_demand import need
 from pushplan.world import InvalidInputError
 
 CONNECT_S = 30.0
-"""How long a scheduler may take to answer [s]."""
+"""Time limit for an answer of a scheduler [s]."""
 _local = threading.local()
 
 

@@ -1,4 +1,4 @@
-"""Whether a policy can be made at all, and whether it is made for a scenario."""
+"""Checks that a policy can be made at all, and that it is made for a scenario."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def misfits(
 
 
 def is_wanted(spec: PolicySpec, suite: Suite, only: Mapping[str, Sequence[str]]) -> bool:
-    """Whether a policy is asked for in a suite; ``only`` as in `misfits`."""
+    """Return True if a policy is to run in a suite; ``only`` as in `misfits`."""
     return spec.label in only.get(suite.name, [spec.label])
 
 

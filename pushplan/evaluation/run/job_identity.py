@@ -61,7 +61,7 @@ def job_spec(job: Job, settings: JobSettings) -> dict[str, Any]:
 
 
 def _of_policy(spec: PolicySpec) -> tuple[dict[str, Any], dict[str, str]]:
-    """What a specification says of a policy, and versions of the libraries of its own code."""
+    """Return the description of a policy, and versions of the libraries that its own code uses."""
     policy: dict[str, Any] = {"label": spec.label, "identity": spec.identity}
     with contextlib.suppress(TypeError):
         if isinstance(spec.source, str):
@@ -111,7 +111,7 @@ _distributions = functools.cache(metadata.packages_distributions)
 
 
 def settings_dict(settings: JobSettings) -> dict[str, Any]:
-    """What results depend on of what all jobs share."""
+    """Return the settings of a batch on which results depend."""
     make = settings.make_env
     return {
         "make_env": make if isinstance(make, str) else getattr(make, "__qualname__", "callable"),
@@ -127,7 +127,7 @@ def same_but_versions(spec: Mapping[str, Any]) -> str:
 
 
 def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
-    """What differs between two specifications, in words."""
+    """Describe the differences between two specifications in words."""
     changed = []
     noted = []
     for section in ("policy", "scenario", "files", "settings", "versions"):
@@ -197,7 +197,7 @@ def _plain(value: Any) -> Any:
 
 
 def _restored(value: Any) -> Any:
-    """What `_plain` wrote; classes are looked up in pushplan only."""
+    """Restore a value that `_plain` wrote; classes are looked up in pushplan only."""
     if isinstance(value, list):
         return [_restored(item) for item in value]
     if not isinstance(value, Mapping):

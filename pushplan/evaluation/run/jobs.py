@@ -49,12 +49,12 @@ class Job:
 
     @property
     def key(self) -> tuple[str, str, int]:
-        """What tells the job apart from others of a batch: policy, scenario key, seed."""
+        """Key of the job among others of a batch: policy, scenario key, seed."""
         return (self.policy.label, str(self.scenario.key), int(self.scenario.seed))
 
     @property
     def id(self) -> str:
-        """What the column ``job`` says; empty where nobody has asked for its specification."""
+        """Text of the column ``job``; empty where nobody has asked for its specification."""
         return "" if self.spec is None else job_id(self.spec)
 
     @property
@@ -68,7 +68,7 @@ class Job:
 
 @dataclass(frozen=True)
 class JobSettings(CheckedFields):
-    """What all jobs of a batch share.
+    """Settings that all jobs of a batch share.
 
     Args:
         make_env: factory of environments, as a callable or as ``"module:function"``; called as
@@ -114,7 +114,7 @@ class JobSettings(CheckedFields):
 
 @dataclass(frozen=True)
 class JobResult:
-    """What became of a job.
+    """Outcome of a job.
 
     Args:
         row: its row of the results.
@@ -128,7 +128,7 @@ class JobResult:
 
     @property
     def tainted(self) -> bool:
-        """Whether the process that ran the job should not run another one."""
+        """True if the process that ran the job should not run another one."""
         return self.row.status in (Status.TIMEOUT, Status.OUT_OF_MEMORY)
 
     def checked(self, job: Job) -> JobResult:

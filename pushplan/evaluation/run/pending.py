@@ -1,4 +1,4 @@
-"""Which jobs of a batch have no result yet."""
+"""Selection of the jobs of a batch that have no result yet."""
 
 from __future__ import annotations
 

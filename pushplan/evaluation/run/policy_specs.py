@@ -1,4 +1,4 @@
-"""Which policy a job runs: a name, a text that names a class, or a factory."""
+"""Policy of a job: a name, a text that names a class, or a factory."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class UnusablePolicyError(InvalidInputError):
 
 @dataclass(frozen=True)
 class PolicySpec:
-    """How to make a policy, in whatever process the job runs.
+    """Recipe for a policy that works in whatever process the job runs.
 
     Args:
         label: what results call it: letters, digits and ``_ . + @ -``, 64 at most.
@@ -94,13 +94,13 @@ class PolicySpec:
 
     @property
     def is_ours(self) -> bool:
-        """Whether it runs code of pushplan only: a name, or the file of a network."""
+        """True if the policy runs code of pushplan only: a name, or the file of a network."""
         named = isinstance(self.source, str) and ":" not in self.source
         return named or self.network is not None
 
     @property
     def group(self) -> str:
-        """What may share a process: code of ours, else this policy alone."""
+        """Key of the policies that may share a process: empty for our code, else this label."""
         ours = self.is_ours and not str(self.source).startswith("sb3:")  # such a file holds code
         return "" if ours else self.label
 
@@ -167,7 +167,7 @@ class PolicySpec:
         )
 
     def _made_object(self) -> Any:
-        """What the callable gives that the source is or names."""
+        """Call the source, or the callable that it names, and return the result."""
         source = load_object(self.source) if isinstance(self.source, str) else self.source
         return source(**self.options)
 
@@ -334,7 +334,7 @@ def _parse_text(given: str, kind: str, names: Sequence[str]) -> PolicySpec:
 
 
 def _classes_to_give(file: str) -> str:
-    """What to give instead of a file alone: its classes that could be policies or planners."""
+    """Say what to give instead of a file alone: its classes that could be policies or planners."""
     with _saying_what_fails("policy", file):
         found = [
             f"{file}:{name}"

@@ -173,7 +173,7 @@ class Recording:
         self.reason = str(info.get("reason") or ("time_limit" if truncated else "ended"))
 
     def episode(self, reason: str | None = None) -> Episode:
-        """What has been recorded.
+        """Return the episode as far as it was recorded.
 
         Args:
             reason: why it ended, where that was a failure.
@@ -206,7 +206,7 @@ class Recording:
         )
 
     def _changes_mode(self, env: Any, action: object) -> bool:
-        """Whether ``env`` begins again in an action mode that takes what the policy gives."""
+        """Return True if ``env`` restarts in an action mode that takes the policy's commands."""
         return (
             isinstance(action, Twist | WheelSpeeds)
             and isinstance(env, AdaptsActions)
@@ -254,7 +254,7 @@ class Recording:
 
 
 def asked(method: Callable[..., Any], *arguments: Any) -> Any:
-    """What a policy answers.
+    """Call a method of a policy and return the answer.
 
     Raises:
         PolicyError: if it raises.
@@ -275,7 +275,7 @@ def held_for(policy: Policy) -> int:
 
 
 def observation_time(env: Any, policy: Policy, step: int) -> float:
-    """How long the observation took that the policy decides on in a step [s].
+    """Return the duration of the observation on which the policy decides in a step [s].
 
     Args:
         env: says it, if it can, as ``observation_time_s``.

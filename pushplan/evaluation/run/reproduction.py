@@ -21,7 +21,7 @@ _ARRAYS = ("times", "robot_poses", "object_poses", "completed", "actions", "rewa
 
 @dataclass(frozen=True)
 class Reproduction:
-    """What came of running a job again.
+    """Comparison of a stored result with a second run of its job.
 
     Attributes:
         stored: the row in the run directory.
@@ -37,7 +37,7 @@ class Reproduction:
 
     @property
     def same(self) -> bool:
-        """Whether row and episode are the same to the byte, times aside."""
+        """True if row and episode are the same to the byte, times aside."""
         return not self.differing
 
 

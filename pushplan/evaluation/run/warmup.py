@@ -17,7 +17,7 @@ _COLUMNS = "area-clearing-2d-10-walled-with-columns"  # for a network made for s
 
 
 def names() -> tuple[str, ...]:
-    """What `warm_up` knows: every policy, and what has kernels beside policies."""
+    """Return the names that `warm_up` knows: every policy, and others that have kernels."""
     return (*policy_names(), *_OTHERS)
 
 

@@ -40,7 +40,7 @@ THREAD_VARIABLES = (
 
 @dataclass(frozen=True)
 class WorkerSetup:
-    """What a worker is told before its first call."""
+    """Settings that a worker gets before its first call."""
 
     main: str | None  # file of the owner's ``__main__`` module, for what is defined there
     preload: Sequence[str]  # modules to import before the first call, so that no call pays for it

@@ -16,7 +16,7 @@ from pushplan.world import InvalidInputError, stream
 from pushplan.world.checks import FloatArray, array
 
 RESAMPLES = 2000
-"""How many samples are drawn; down to a tenth of them for more than 10,000 scores."""
+"""Number of bootstrap samples; down to a tenth of it for more than 10,000 scores."""
 _BATCH = 2_000_000  # values drawn at a time
 Strata = Sequence[FloatArray]
 
@@ -58,7 +58,7 @@ def interquartile_mean(scores: Strata) -> Aggregate:
 
 
 def probability_of_improvement(first: Strata, second: Strata) -> Aggregate:
-    """How likely an episode of the first scores more than one of the second in the same setting.
+    """Estimate the probability that an episode of the first scores more than one of the second.
 
     Mean over settings of the Mann-Whitney statistic; a tie counts one half.
 

@@ -135,7 +135,7 @@ def wilson(successes: int, count: int, *, z: float = 1.959963984540054) -> Propo
 
 
 def signed_rank_test(gaps: FloatArray) -> tuple[float, float]:
-    """Whether paired differences lie to one side of 0, and how far.
+    """Test whether paired differences lie to one side of 0, and how far.
 
     Wilcoxon's signed-rank test, without the differences that are 0. Differences of one size, such
     as those of success, say nothing but their signs: the exact sign test, which is McNemar's.
@@ -173,7 +173,7 @@ def holm(p_values: Sequence[float]) -> list[float]:
 
 
 def pairs_needed(gaps: FloatArray, tests: int = 1) -> int | None:
-    """How many pairs separate two policies whose differences go on as so far.
+    """Return the number of pairs that separate two policies if the observed effect holds.
 
     Guenther's sample size for a paired t-test (Am. Statist. 35, 1981) at level 0.05 / ``tests``
     and power 0.8, divided by the efficiency of the signed-rank test beside it.

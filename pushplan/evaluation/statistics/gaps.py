@@ -1,4 +1,4 @@
-"""How far episodes are from the best known solution of their scenario, and from its bound."""
+"""Gaps of episodes to the best known solution of their scenario, and to its bound."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pushplan.scenarios.known_bounds import KnownBounds
 
 @dataclass(frozen=True)
 class Gap:
-    """How far the successful episodes of a policy are from what is known, as fractions.
+    """Gaps of a policy's successful episodes to the best known and to the bound, as fractions.
 
     Args:
         setting: the scenarios without their seeds.

@@ -1,4 +1,4 @@
-"""What the rows of a run say about each policy, and about each pair of policies."""
+"""Statistics of each policy of a run, and of each pair of policies."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from pushplan.metrics import METRICS, Role, metric_names
 from pushplan.world.checks import FloatArray, choice
 
 PAIRS = ("first", "all")
-"""Which policies are compared: the first one with each other one, or all."""
+"""Policies that are compared: the first one with each other one, or all."""
 TIMINGS = (
     "plan_time_median_s",
     "plan_time_max_s",
@@ -59,7 +59,7 @@ class PolicySummary:
 
 @dataclass(frozen=True)
 class PairedDifference:
-    """How much more of a metric the second policy has than the first, scenario by scenario.
+    """Difference of a metric between the second policy and the first, scenario by scenario.
 
     Attributes:
         setting: the suite, or the scenarios without their seeds.
@@ -90,12 +90,12 @@ class PairedDifference:
 
     @property
     def significant(self) -> bool:
-        """Whether the corrected p value is below 0.05, with 10 scenarios at least."""
+        """True if the corrected p value is below 0.05, with 10 scenarios at least."""
         return self.difference.count >= ENOUGH and self.p_corrected < LEVEL
 
     @property
     def verdict(self) -> str:
-        """What the second policy is: "better", "worse", "equal" or "not separated"."""
+        """Verdict on the second policy: "better", "worse", "equal" or "not separated"."""
         if self.better == self.worse == 0:
             return "equal"
         if not self.significant:

@@ -26,7 +26,7 @@ DATABASE = "results.db"
 LOCK = ".lock"
 """File in a run directory that its writer holds."""
 WAIT_S = 30.0
-"""How long a writer waits for another program that holds the database [s]."""
+"""Time for which a writer waits for another program that holds the database [s]."""
 _UNLOCKED = "&vfs=unix-none"
 """Option of SQLite for a disk without locks, or without the file that readers of a log share."""
 _TYPES = {"str": "TEXT", "bool": "INTEGER", "int": "INTEGER", "float": "REAL"}
@@ -45,7 +45,7 @@ _PLAIN = re.compile(
     rf"{_TABLE}\((?:{_COLUMN}, )*(?:{_COLUMN}|{_KEY})\)(?: WITHOUT ROWID)?|"
     r"CREATE INDEX shown ON results \(policy, scenario, seed\)|sqlite_autoindex_\w+"
 )
-"""What our tables are made with: plain columns, nothing that SQLite would compute."""
+"""Definitions of our tables: plain columns, nothing that SQLite would compute."""
 _STEPS = 10_000
 _LEAST_STEPS = 5_000_000
 _STEPS_PER_BYTE = 50
@@ -293,7 +293,7 @@ def _row_of(values: Mapping[str, Any]) -> ResultRow:
 
 
 def read_about(db: sqlite3.Connection) -> dict[str, Any]:
-    """What was noted about a run.
+    """Read the notes about a run.
 
     Raises:
         SchemaError: if it is of another version, or a note is none that can be read.

@@ -15,7 +15,7 @@ from pushplan.world import InvalidInputError
 
 @dataclass(frozen=True)
 class Merged:
-    """What `merge` did.
+    """Result of `merge`.
 
     Attributes:
         added: results that were not there.

@@ -1,4 +1,4 @@
-"""Where results come from: code, machine, packages and command of each call that ran jobs."""
+"""Provenance of results: code, machine, packages and command of each call that ran jobs."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ UNSEEN = frozenset(
 
 
 def provenance(workers: int) -> dict[str, Any]:
-    """What to note about a run that begins now, as JSON values.
+    """Collect the provenance of a run that begins now, as JSON values.
 
     Args:
         workers: processes that run the jobs.

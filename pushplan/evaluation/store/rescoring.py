@@ -16,7 +16,7 @@ from pushplan.world import Episode, SchemaError
 
 @dataclass(frozen=True)
 class Rescored:
-    """What `rescore` did.
+    """Result of `rescore`.
 
     Attributes:
         episodes: how many recorded episodes were scored.
@@ -44,7 +44,7 @@ def rescore(path: str | Path, metrics: Sequence[str] = (), *, columns: bool = Tr
         InvalidInputError: if another process writes there.
     """
     wanted = {metric_label(metric): metric for metric in metrics}
-    sources = {}  # what tells versions of a metric apart: a hash of its file, or of our code
+    sources = {}  # versions of the metrics: a hash of the file of each, or of our code
     for label, metric in wanted.items():
         metric_function(metric)
         sources[label] = source_digest(metric.rpartition(":")[0]) or package_digest()
@@ -80,6 +80,6 @@ def rescore(path: str | Path, metrics: Sequence[str] = (), *, columns: bool = Tr
 
 
 def metric_label(metric: str) -> str:
-    """What a metric is called in results: its name, a file's without its folder."""
+    """Return the name of a metric in results: its own, or that of a file without its folder."""
     where, colon, name = metric.rpartition(":")
     return f"{Path(where).name}{colon}{name}" if where.endswith(".py") else metric

@@ -46,7 +46,7 @@ def csv_text(header: Sequence[str], lines: Iterable[Sequence[object]]) -> str:
 
 
 class Status(enum.StrEnum):
-    """How a job ended. Only `DONE` means that the episode ran to its own end."""
+    """Ways in which a job ends. Only `DONE` means that the episode ran to its own end."""
 
     DONE = "done"
     """The episode ended by the rules of its task, with or without success."""
@@ -135,22 +135,22 @@ class ResultRow:
 
     @property
     def setting(self) -> str:
-        """What episodes are averaged over: the suite, or the scenario without its seed."""
+        """Group in which episodes are averaged: the suite, or the scenario without its seed."""
         return self.pool or setting_of(self.scenario, self.seed)
 
     @property
     def trace_file(self) -> str | None:
-        """Where the recorded episode is in a run directory; None if none was kept."""
+        """Path of the recorded episode in a run directory; None if none was kept."""
         return f"episodes/{self.trace}.npz" if self.trace else None
 
     @property
     def detail_file(self) -> str:
-        """Where the traceback of a failed job is in a run directory, if one was kept."""
+        """Path of the traceback of a failed job in a run directory, if one was kept."""
         return f"failures/{self.job}.txt"
 
     @property
     def failed(self) -> bool:
-        """Whether the job ended otherwise than by the rules of its task."""
+        """True if the job ended otherwise than by the rules of its task."""
         return self.status != Status.DONE
 
 
@@ -197,7 +197,7 @@ def rows_csv(rows: Sequence[ResultRow], more: Mapping[str, Sequence[object]] | N
 
 
 def setting_of(scenario: str, seed: int) -> str:
-    """What a scenario is averaged in: ``SUITE`` of the key ``SUITE/NAME-SEED``, else ``NAME``."""
+    """Return the group to average in: ``SUITE`` of the key ``SUITE/NAME-SEED``, else ``NAME``."""
     start = scenario.removesuffix(f"-{seed}")
     suite, _, name = start.rpartition("/")
     return suite or name

@@ -200,7 +200,7 @@ class RunDirectory:
             db.executemany("INSERT OR REPLACE INTO measured VALUES (?, ?, ?, ?)", values)
 
     def about(self) -> dict[str, Any]:
-        """What was noted about the run."""
+        """Return the notes about the run."""
         with self._use() as db:
             return read_about(db)
 
@@ -226,7 +226,7 @@ class RunDirectory:
 
 
 def files_of(folder: Path, row: ResultRow) -> tuple[bytes | None, str]:
-    """What is kept beside a row in the run directory of a stranger.
+    """Read the files that belong to a row in the run directory of a stranger.
 
     Returns:
         The recorded episode, None if it is missing or is not what its name says, and the traceback.
@@ -248,7 +248,7 @@ def _own_file(folder: Path, name: str, limit: int) -> bytes:
 
 
 def _inode(path: Path) -> tuple[int, int] | None:
-    """What tells a file from another one of its name; None if there is none."""
+    """Return device and inode of a file, to tell it from another of its name; None if missing."""
     try:
         found = path.stat()
     except OSError:

@@ -29,7 +29,7 @@ _BAD = (sqlite3.Error, KeyError, TypeError, ValueError, OverflowError)
 
 @dataclass(frozen=True)
 class Salvaged:
-    """What `salvage` saved.
+    """Result of `salvage`.
 
     Attributes:
         rows: results in the new directory.

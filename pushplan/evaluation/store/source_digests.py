@@ -77,7 +77,7 @@ def _joined(files: Iterable[Path]) -> str:
 
 
 def _version(file: Path) -> tuple[int, ...]:
-    """What changes where a file is written again; jobs by the thousand ask for the same one."""
+    """Return a key that changes when a file is rewritten; thousands of jobs ask for the same."""
     found = file.stat()
     return found.st_mtime_ns, found.st_size, found.st_ino
 

@@ -1,4 +1,4 @@
-"""How far a run is, seen from another process."""
+"""Progress of a run, seen from another process."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pushplan.world.checks import number
 
 @dataclass(frozen=True)
 class RunStatus:
-    """How far a run is.
+    """Progress of a run.
 
     Attributes:
         active: True if a process writes into the directory now; None on a disk without file locks,
