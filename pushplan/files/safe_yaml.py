@@ -22,7 +22,7 @@ MAX_NODES = 60_000
 _WHOLE = "tag:yaml.org,2002:int"
 _REAL = "tag:yaml.org,2002:float"
 _TEXTS = ("tag:yaml.org,2002:timestamp", "tag:yaml.org,2002:value")
-"""What YAML 1.1 takes for more than a text: dates and ``=``."""
+"""Tags of texts that YAML 1.1 takes for more than a text: dates and ``=``."""
 _NUMBERS = {
     _WHOLE: re.compile(r"(?:[-+]?[0-9]+(?:_[0-9]+)*|0o[0-7]+|0x[0-9a-fA-F]+)\Z"),
     _REAL: re.compile(
