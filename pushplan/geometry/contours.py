@@ -36,7 +36,7 @@ class Contours(NamedTuple):
 
 
 def gap_of(static: StaticMap) -> float:
-    """How far paths stay off obstacles [m]; two obstacles closer than this leave no passage."""
+    """Return the gap of paths to obstacles [m]; two obstacles closer than this leave no passage."""
     return GAP * _diagonal(static)
 
 
@@ -142,7 +142,7 @@ def _outlines(
 
 @kernel(allocates=True)
 def free_points(points: FloatArray, obstacles: Obstacles, box: FloatArray, gap: float) -> BoolArray:
-    """Which of the points (N, 2) [m] lie in the box (4,) and ``gap`` or more off every obstacle."""
+    """Check which points (N, 2) [m] lie in the box (4,) and ``gap`` or more off every obstacle."""
     keep = np.empty(points.shape[0], dtype=np.bool_)
     for i in range(points.shape[0]):
         x = points[i, 0]

@@ -57,7 +57,7 @@ def convex_penetration(a: FloatArray, b: FloatArray) -> tuple[float, float, floa
 
 @kernel
 def _is_separated_by_edge(a: FloatArray, b: FloatArray) -> bool:
-    """Whether an edge of ``a`` has all of ``b`` on its outer side."""
+    """Return True if an edge of ``a`` has all of ``b`` on its outer side."""
     n = a.shape[0]
     for i in range(n):
         j = i + 1 if i + 1 < n else 0
@@ -77,7 +77,7 @@ def _is_separated_by_edge(a: FloatArray, b: FloatArray) -> bool:
 
 @kernel
 def convex_overlap(a: FloatArray, b: FloatArray) -> bool:
-    """Whether the interiors of two convex counter-clockwise polygons meet; touching does not."""
+    """Return True if two convex counter-clockwise polygons overlap; touching does not count."""
     return not (_is_separated_by_edge(a, b) or _is_separated_by_edge(b, a))
 
 

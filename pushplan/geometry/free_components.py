@@ -15,7 +15,7 @@ from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, frozen
 
 @dataclass(frozen=True, eq=False)
 class FreeComponents(ArrayRecord):
-    """Where the centre of a disc may be, cell by cell, and which places are connected.
+    """Cells in which the centre of a disc may be, by connected component.
 
     Args:
         grid: where the cells are.

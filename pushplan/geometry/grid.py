@@ -117,7 +117,7 @@ def clearance_field(
 
 
 def occupancy(static: StaticMap, grid: Grid, clearance: float = 0.0) -> BoolArray:
-    """Whether each cell centre is inside a static obstacle or within ``clearance`` [m] of one.
+    """Check which cell centres are in a static obstacle or within ``clearance`` [m] of one.
 
     Returns:
         (rows, columns) flags.

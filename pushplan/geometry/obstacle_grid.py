@@ -19,7 +19,7 @@ _NONE = frozen(np.zeros(0, dtype=np.int64))
 
 
 class ObstacleGrid(NamedTuple):
-    """Which obstacles reach into each cell."""
+    """Index of the obstacles that reach into each cell."""
 
     origin: FloatArray  # (2,) least x, y [m]
     cell: float  # side of a cell [m]

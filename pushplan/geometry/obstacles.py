@@ -80,7 +80,7 @@ def _segments_closer(
     by: float,
     reach_sq: float,
 ) -> bool:
-    """Whether the segments p-q and a-b cross or come closer than the root of ``reach_sq``."""
+    """Return True if the segments p-q and a-b cross or are closer than the root of ``reach_sq``."""
     dx = qx - px
     dy = qy - py
     ex = bx - ax
@@ -103,7 +103,7 @@ def _segments_closer(
 def crosses_obstacle(
     px: float, py: float, qx: float, qy: float, obstacles: Obstacles, k: int, margin: float
 ) -> bool:
-    """Whether the segment p-q comes closer than ``margin`` [m] to obstacle ``k``."""
+    """Return True if the segment p-q comes closer than ``margin`` [m] to obstacle ``k``."""
     vertices, offsets, radii, boxes = obstacles
     if (
         max(px, qx) < boxes[k, 0] - margin
@@ -145,7 +145,7 @@ def crosses_obstacle(
 def line_of_sight(
     px: float, py: float, qx: float, qy: float, obstacles: Obstacles, margin: float
 ) -> bool:
-    """Whether the segment p-q stays ``margin`` [m], at least, away from all obstacles."""
+    """Return True if the segment p-q stays ``margin`` [m], at least, away from all obstacles."""
     for k in range(obstacles.radii.shape[0]):
         if crosses_obstacle(px, py, qx, qy, obstacles, k, margin):
             return False

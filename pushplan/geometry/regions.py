@@ -85,7 +85,7 @@ def regions_of(target: Target, *, to_center: bool = False) -> Regions:
 
 
 def outside_area(target: Target, points: FloatArray) -> BoolArray:
-    """Which of the points (..., 2) [m] lie outside a clearance area; none for other targets.
+    """Check which points (..., 2) [m] lie outside a clearance area; none for other targets.
 
     They are at the goal already. A way through the outside is no way for a point inside: only the
     open edges count for it.

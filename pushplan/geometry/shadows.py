@@ -188,10 +188,10 @@ def _bends_in_sight(
 
 @dataclass(frozen=True, eq=False)
 class BendDistances:
-    """How far every cell of a map is from every bend around its obstacles."""
+    """Distances of every cell of a map to every bend around its obstacles."""
 
     static: StaticMap  # the map
-    grid: Grid  # where the cells are
+    grid: Grid  # place of the cells
     # (rows, columns, B) length [m] of the shortest way that goes on past the bend; inf where no way
     # leads. Cells inside an obstacle have the value of the nearest free one.
     table: Table

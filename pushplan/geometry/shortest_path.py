@@ -62,7 +62,7 @@ class Path(ArrayRecord):
 
 
 class _Graph(NamedTuple):
-    """What depends on the map alone."""
+    """Part of the visibility graph that depends on the map alone."""
 
     contours: Contours  # only corners where a path can be
     starts: IntArray
@@ -87,7 +87,7 @@ def _graph_of(static: StaticMap, clearance: float) -> _Graph:
 
 
 def bends_of(static: StaticMap, clearance: float = 0.0) -> tuple[Contours, FloatArray]:
-    """Where shortest paths may bend, and the (B, B) shortest distances between the bends [m]."""
+    """Return the bends of shortest paths, and the (B, B) shortest distances between them [m]."""
     graph = _graph_of(static, clearance)
     count = len(graph.contours.corners)
     between = np.full((count, count), np.inf)
@@ -149,7 +149,7 @@ class GoalDistances:
 
     @property
     def gap(self) -> float:
-        """How far paths stay off the grown obstacles [m]."""
+        """Distance of paths to the grown obstacles [m]."""
         return gap_of(self.static)
 
     @property
@@ -227,7 +227,7 @@ def _distances(
 
 
 def ends_on_rims(static: StaticMap, clearance: float, regions: Regions) -> FloatArray:
-    """Where a path may end at the rim (N, 2) [m] of what covers a part of the goal."""
+    """Find (N, 2) points [m] where a path may end at the rim of what covers a part of the goal."""
     shapes = obstacles_of(static, clearance)
     contours = contours_of(static, clearance)
     which = None
@@ -301,7 +301,7 @@ def leave_inflation(static: StaticMap, clearance: float, point: FloatArray) -> F
 
 
 def _ways_out(static: StaticMap, clearance: float, near: IntArray) -> FloatArray:
-    """Where outlines of the obstacles ``near`` cross each other or the bounds, (N, 2) [m]."""
+    """Find where outlines of the obstacles ``near`` cross each other or the bounds, (N, 2) [m]."""
     contours = contours_of(static, clearance)
     which = np.isin(contours.owner, near)
     edges = contour_edges(contours, which)

@@ -32,17 +32,17 @@ class Nodes(NamedTuple):
 class GoalScene(NamedTuple):
     """A goal among obstacles, as kernels read them."""
 
-    regions: Regions  # where paths end
+    regions: Regions  # ends of paths
     obstacles: Obstacles
     box: FloatArray  # (4,) x_min, y_min, x_max, y_max of where paths may lead [m]
-    gap: float  # how far paths stay off obstacles [m]
+    gap: float  # distance of paths to obstacles [m]
 
 
 @kernel(inline=True)
 def is_tangent(
     dx: float, dy: float, incoming: FloatArray, outgoing: FloatArray, k: int, gap: float
 ) -> bool:
-    """Whether a leg from (dx, dy) touches corner ``k`` as a tangent, as shortest paths do."""
+    """Return True if a leg from (dx, dy) is tangent to corner ``k``, as shortest paths are."""
     before = incoming[k, 0] * dy - incoming[k, 1] * dx
     after = outgoing[k, 0] * dy - outgoing[k, 1] * dx
     return bool((before >= -gap and after <= gap) or (before <= gap and after >= -gap))

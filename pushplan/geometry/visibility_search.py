@@ -29,7 +29,7 @@ FOUND = 0
 EXHAUSTED = 1
 PAUSED = 2
 FULL = 3
-"""What `search` returns: there, no path exists, its budget is used up, more memory is needed."""
+"""Results of `search`: path found, no path exists, budget used up, more memory is needed."""
 START = -1
 """Index of the start among the nodes."""
 _USED = 1
