@@ -1,4 +1,4 @@
-"""What happens to the objects when the robot sweeps along a path."""
+"""Motion of the objects when the robot sweeps along a path."""
 
 from pushplan.interaction.interaction_model import Interaction, InteractionModel, SweepsMany
 from pushplan.interaction.quasi_static import QuasiStatic

@@ -62,7 +62,7 @@ def clip_facing(
     inc: FloatArray,
     sign: float,  # factor on the edge's outward normal
     widest: float,  # gap up to which a point counts [m]
-    beside: bool,  # whether a facing edge that lies beside the reference edge counts
+    beside: bool,  # True if a facing edge that lies beside the reference edge counts
     out: FloatArray,  # (2, 5) receives x, y [m], normal, gap [m]
 ) -> int:
     """Clip the edge that faces the reference edge against it; returns the number of points."""

@@ -1,4 +1,4 @@
-"""What the kernels of ice contacts know of a hull and the floes around it."""
+"""Hull and surrounding floes as the kernels of ice contacts read them."""
 
 from __future__ import annotations
 

@@ -252,7 +252,7 @@ def drive_ice(
     robot_to: FloatArray,  # (3,) where it goes, along a straight line
     poses: FloatArray,  # (K, 3) of the objects, changed in place
     problem: IceProblem,  # with the corners of these poses in its memory
-    work: float,  # what the result is added to [kg m]
+    work: float,  # sum to which the result is added [kg m]
 ) -> tuple[float, int]:
     """Move the hull to a pose in small steps among the objects; the work and how many steps."""
     here = problem.scratch.pose[0]

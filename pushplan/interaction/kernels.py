@@ -20,15 +20,15 @@ from pushplan.interaction.contact import contacts, least_overlap
 from pushplan.interaction.separation import drag_along, separate
 from pushplan.world.checks import FloatArray, IntArray
 
-_NEARBY = 3.0  # how far beyond the robot's reach objects are nearby at first [robot radii]
+_NEARBY = 3.0  # reach beyond the robot's within which objects are nearby at first [robot radii]
 
 
 class Bodies(NamedTuple):
-    """What the kernels know of the robot, the objects and the walls; arrays in SI units."""
+    """Robot, objects and walls as the kernels read them; arrays in SI units."""
 
     robot_vertices: FloatArray  # (V, 2) convex parts of the robot in its body frame
     robot_offsets: IntArray  # (P + 1,)
-    wall_parts: int  # how many of the first parts count at walls: all but the wheels
+    wall_parts: int  # number of the first parts, which count at walls: all but the wheels
     robot_radius: float
     vertices: FloatArray  # (W, 2) outlines of the objects in their body frames
     offsets: IntArray  # (K + 1,)
@@ -114,7 +114,7 @@ def _gather(
 def _touching(
     x: float, y: float, reach: float, poses: FloatArray, bodies: Bodies, scratch: Scratch
 ) -> int:
-    """How many objects nearby come within ``reach`` of (x, y); they become the active ones."""
+    """Mark nearby objects within ``reach`` of (x, y) as active, and return their number."""
     count = 0
     for i in range(scratch.nearby[0]):
         k = scratch.near[i]
@@ -203,7 +203,7 @@ def _against_robot(
 
 @kernel
 def _reaches(box: FloatArray, x: float, y: float, r: float) -> bool:
-    """Whether the square around a disc overlaps a box (4,) x_min, y_min, x_max, y_max."""
+    """Return True if the square around a disc overlaps a box (4,) x_min, y_min, x_max, y_max."""
     across: bool = x + r > box[0] and x - r < box[2]
     return across and y + r > box[1] and y - r < box[3]
 
@@ -379,7 +379,7 @@ def advance(
 
 @kernel
 def robot_held(pose: FloatArray, bodies: Bodies, settings: Settings, scratch: Scratch) -> bool:
-    """Whether the robot at ``pose`` (3,) overlaps something static by more than the jam depth."""
+    """Return True if the robot at ``pose`` (3,) overlaps static obstacles beyond the jam depth."""
     x = pose[0]
     y = pose[1]
     r = bodies.robot_radius

@@ -1,4 +1,4 @@
-"""What passing through ice leaves behind, on a grid: the contract of occupancy predictors.
+"""Occupancy of ice after a ship has passed, on a grid: the contract of occupancy predictors.
 
 After Zhong et al., "Autonomous Navigation in Ice-Covered Waters with Learned Predictions on
 Ship-Ice Interactions" (2025, arXiv 2409.11326): a patch of 40 x 40 cells about the ship with the
@@ -85,7 +85,7 @@ class PassageBatch(CheckedFields):
 
 @dataclass(frozen=True, eq=False)
 class OccupancyForecast(CheckedFields):
-    """What a predictor expects of each passage of a batch."""
+    """Forecast of a predictor for each passage of a batch."""
 
     field_prefix = "forecast."
 

@@ -34,7 +34,7 @@ def sweep_near(
     poses: FloatArray,  # (K, 3) poses of the objects, changed in place
     bodies: IceBodies,
     settings: IceSettings,
-    margin: float,  # how far from the hull an object may be that is looked at [m]
+    margin: float,  # greatest distance from the hull of an object that is looked at [m]
     out: FloatArray,  # (N, K, 3) receives the poses at each path pose
     works: FloatArray,  # (N - 1,) receives the work from each pose to the next [kg m]
 ) -> None:
@@ -59,7 +59,7 @@ def sweep_near(
 
 
 MARGIN = 1.0
-"""How far from the hull objects are that a sweep still looks at [circumscribed radii]."""
+"""Distance from the hull up to which a sweep looks at objects [circumscribed radii]."""
 
 
 PathSweeper = Callable[[FloatArray, FloatArray, FloatArray, FloatArray], bool]

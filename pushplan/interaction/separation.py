@@ -18,7 +18,7 @@ def _nudge(pose: FloatArray, x: float, y: float, ix: float, iy: float, inv: floa
 @kernel
 def separate(
     points: FloatArray,  # (2, 5) contact points from the first to the second, from `contacts`
-    found: int,  # how many of them count
+    found: int,  # number of them that count
     a: FloatArray,  # (3,) pose of the first body, changed in place
     weight_a: float,  # its inverse mass; 0 if it cannot move
     inv_a: float,  # its 1 / c²
