@@ -1,4 +1,4 @@
-"""Whether a robot closed its own way for good."""
+"""Detection of robots that have closed their own path for good."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def made_unsolvable(episode: Episode) -> float | None:
 
 @lru_cache(maxsize=64)
 def _solvable(world: World) -> bool:
-    """Whether pushes are found that lead to the goal, from the free place nearest to the robot."""
+    """Return True if pushes open a path to the goal from the free place nearest to the robot."""
     world = world.with_fixed_as_static()
     search = KeyholeSearch(
         world.moved(robot_pose=nearest_free_pose(world, _CONFIG)),

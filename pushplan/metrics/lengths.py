@@ -13,7 +13,7 @@ def success(episode: Episode) -> float:
 
 
 def steps(episode: Episode) -> float:
-    """How many actions were sent to the environment."""
+    """Count the actions that were sent to the environment."""
     return float(len(episode.actions))
 
 

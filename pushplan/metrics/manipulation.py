@@ -18,7 +18,7 @@ from pushplan.world.outline import centroid
 
 @dataclass(frozen=True)
 class ManipulationScores:
-    """How well a robot brought objects to where they belong.
+    """Scores of a robot that brings objects to where they belong.
 
     Args:
         success: S_manip in [0, 1]: the fraction of the objects whose sub-task was completed.

@@ -16,7 +16,7 @@ Clearance = Literal["robot", "point"]
 
 @dataclass(frozen=True)
 class NavigationScores:
-    """How well a robot got to its goal among things that it may push.
+    """Scores of a robot that drives to its goal among things that it may push.
 
     Args:
         success: whether the goal was reached.

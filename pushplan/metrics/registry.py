@@ -17,7 +17,7 @@ GoalKind = Literal["robot", "objects"]
 
 
 class Role(enum.Enum):
-    """Where results show a metric."""
+    """Places in which results show a metric."""
 
     SCORE = "score"
     """Everywhere: a column, the tables, the plots, the page and the paired differences."""
