@@ -82,7 +82,7 @@ def coarse_path(
 
 
 def reachable(world: World, stopped: Callable[[], bool] = never) -> bool:
-    """Whether the robot's inscribed disc may get from the start to the goal around the walls.
+    """Return True if the robot's inscribed disc may get from the start to the goal around walls.
 
     False only where it certainly does not, or ``stopped`` ends the search.
     """

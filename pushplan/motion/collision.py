@@ -1,4 +1,4 @@
-"""Whether a footprint is free of obstacles: convex polygons against convex polygons."""
+"""Collision checks of a footprint: convex polygons against convex polygons."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class ConvexObstacles(NamedTuple):
 
 @functools.lru_cache(maxsize=64)
 def footprint(robot: RobotModel, margin: float = 0.0) -> Footprint:
-    """What of a robot counts at walls, every part grown by ``margin`` [m] with sharp corners."""
+    """Return the robot's parts that count at walls, grown by ``margin`` [m] with sharp corners."""
     parts = list(robot.wall_parts)
     if margin != 0.0:
         grown = [Polygon(part).buffer(margin, join_style="mitre").exterior for part in parts]
@@ -97,7 +97,7 @@ def is_free(
     among: ConvexObstacles,
     scratch: FloatArray,  # (V, 2) memory for the corners
 ) -> bool:
-    """Whether a footprint at ``pose`` (3,) overlaps nothing and its origin is in bounds."""
+    """Return True if a footprint at ``pose`` (3,) overlaps nothing and its origin is in bounds."""
     x = pose[0]
     y = pose[1]
     r = shape.radius
@@ -138,7 +138,7 @@ def first_blocked(
 def static_depth(
     pose: FloatArray, shape: Footprint, among: ConvexObstacles, scratch: FloatArray
 ) -> float:
-    """How deep the footprint is in what is static [m]; 0 where it is free."""
+    """Return the depth of the footprint in static obstacles [m]; 0 where it is free."""
     deepest = 0.0
     if is_free(pose, shape, among, scratch):
         return deepest

@@ -1,4 +1,4 @@
-"""Where the middle of an object is when it is done."""
+"""Places at which the middle of an object is when the object is done."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ _SHARP = 0.8
 
 
 def is_far(improver: PathImprover) -> bool:
-    """Whether the goal is more edges of a tree away than one grows in some milliseconds."""
+    """Return True if the goal is more edges of a tree away than one grows in some milliseconds."""
     away = improver.goal.distance(*improver.world.robot_pose[:2])
     return bool(away > _FAR * improver.config.edge * improver.size)
 
@@ -54,7 +54,7 @@ def warm_start_arcs(
     goal: NavigationGoal,
     clearance: float,  # of the shortest path [m]
     radius: float,  # least turning radius [m]
-    depth: float,  # how far into the goal the arcs end [m]
+    depth: float,  # depth in the goal at which the arcs end [m]
     stopped: Callable[[], bool],  # ends the search of the path
 ) -> FloatArray | None:
     """Arcs along the shortest homotopic path; they may touch walls and objects.

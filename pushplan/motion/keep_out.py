@@ -22,7 +22,7 @@ _LEVELS = 4  # fractions of the margin that an obstacle near the robot may keep
 
 
 def keep_out(world: World) -> StaticMap:
-    """What the robot keeps away from: every obstacle grown by ``world.margin``.
+    """Return the map of what the robot keeps away from: every obstacle grown by ``world.margin``.
 
     An obstacle that the robot is nearer to than that grows by a fraction of the margin: as many
     quarters as leave the robot a quarter more, or nothing, so that it may always drive on along
@@ -77,7 +77,7 @@ def _grown_part(static: StaticMap, k: int, margin: float) -> FloatArray:
 
 
 def _overlap(one: FloatArray, other: FloatArray) -> bool:
-    """Whether two convex outlines overlap: no side of either has the other one beyond it."""
+    """Return True if two convex outlines overlap: no side of either separates them."""
     for a, b in ((one, other), (other, one)):
         edges = np.roll(a, -1, axis=0) - a
         normals = np.column_stack([edges[:, 1], -edges[:, 0]])

@@ -1,4 +1,4 @@
-"""What no plan can cost less than."""
+"""Lower bound on the cost of every plan."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def length_bound(world: World, stopped: Callable[[], bool] = lambda: False) -> f
 
 
 def is_clear(static: StaticMap, point: FloatArray, clearance: float) -> bool:
-    """Whether a disc about a point (2,) touches no wall; else its path begins with a way out."""
+    """Return True if a disc at a point (2,) is off all walls; else its path first leaves them."""
     place = leave_inflation(static, clearance, point)
     return place is not None and bool(np.array_equal(place, point))
 

@@ -44,7 +44,7 @@ class Candidate:
 
 
 class Lead(NamedTuple):
-    """What every path of a search begins with, before the search itself."""
+    """Motion with which every path of a search begins, before the search itself."""
 
     pieces: FloatArray  # (E, 2) arcs from the robot's pose on, as in `pushplan.motion.dubins`
     pose: FloatArray  # (3,) where the search begins
@@ -52,7 +52,7 @@ class Lead(NamedTuple):
 
 
 class PathImprover:
-    """What the searches of one planning call share: the problem, its clock, and the best path."""
+    """State shared by the searches of a planning call: problem, clock, and best path."""
 
     def __init__(
         self,
@@ -70,7 +70,7 @@ class PathImprover:
         self.iterations = self.nodes = self.relaxed = 0
         self.tight = False
         self.backward = 0.0
-        """How far paths of trees may lead back [m]."""
+        """Greatest distance by which paths of trees may lead back [m]."""
         self.lead = self._no_lead = Lead(
             np.empty((0, 2)), owned(world.robot_pose), owned(world.movables.poses)
         )
@@ -153,7 +153,7 @@ class PathImprover:
 
     @property
     def room(self) -> Room:
-        """Where the robot may go."""
+        """Free space of the robot."""
         problem = self.problem
         return Room(problem.footprint, problem.walls, problem.goal, problem.spacing)
 
@@ -169,11 +169,11 @@ class PathImprover:
 
     @property
     def solved(self) -> bool:
-        """Whether the best path is free of jams."""
+        """True if the best path is free of jams."""
         return self.best_cost < self.jam_cost
 
     def stopped(self) -> bool:
-        """Whether the stop rule fires now."""
+        """Return True if the stop rule fires now."""
         if isinstance(self.problem.contacts, SweptContacts):
             self.problem.contacts.call.raise_error()
         return self._call.check(self.iterations, self.plan_cost)
@@ -183,7 +183,7 @@ class PathImprover:
         arcs: FloatArray,  # (E, 2) length [m] and curvature [1/m], from the end of the lead on
         limit: float = np.inf,  # cost that it must stay below [kg m]
         *,
-        free: bool = True,  # whether it is known to touch no wall and to reach the goal
+        free: bool = True,  # True if it is known to touch no wall and to reach the goal
     ) -> Candidate | None:
         """The path along some arcs with its cost; None if it is not one that could be a plan."""
         problem = self.problem

@@ -11,7 +11,7 @@ from pushplan.world.checks import FloatArray
 
 
 class PathProblem(NamedTuple):
-    """What a path costs and where it may go."""
+    """Costs and constraints of a path."""
 
     robot_mass: float  # m₀ [kg]
     push_weight: float  # w: weight of a unit of interaction work

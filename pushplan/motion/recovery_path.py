@@ -17,7 +17,7 @@ from pushplan.world.checks import FloatArray, IntArray
 STEP = 0.08
 """Length of a step [circumscribed radii], and turn of one on the spot [rad]."""
 _CELL = 0.6  # sides of the boxes of poses of which one is looked at each [steps]
-_REACH = 3.0  # how far away the place to turn may be [circumscribed radii]
+_REACH = 3.0  # greatest distance of the place to turn [circumscribed radii]
 _MOST = 100_000  # poses that are looked at
 _CLEARANCE = 1.05  # clearance that the robot needs to turn about [circumscribed radii]
 _CURVATURES = (0.0, 0.5, -0.5, 1.0, -1.0)  # of the arcs [1 / circumscribed radius]
@@ -25,7 +25,7 @@ _DEEPER = 1e-3  # by how much the robot may get deeper into what it touches [cir
 
 
 class RecoveryProblem(NamedTuple):
-    """Where the robot is, and what it must not touch."""
+    """Start of a recovery path, and the obstacles that it must not touch."""
 
     start: FloatArray  # (3,) pose of the robot
     steps: FloatArray  # (A, 2) distance [m] and turn [rad] of each step that it may take
@@ -37,7 +37,7 @@ class RecoveryProblem(NamedTuple):
 
 @kernel
 def can_turn(pose: FloatArray, size: float, among: ConvexObstacles) -> bool:
-    """Whether the disc that the robot needs to turn about is within the bounds and free."""
+    """Return True if the disc that the robot needs to turn about is within the bounds and free."""
     x = pose[0]
     y = pose[1]
     bounds = among.bounds
@@ -61,7 +61,7 @@ def can_turn(pose: FloatArray, size: float, among: ConvexObstacles) -> bool:
 def _gets_deeper(
     pose: FloatArray, problem: RecoveryProblem, allowed: FloatArray, scratch: FloatArray
 ) -> bool:
-    """Whether the robot is deeper than ``allowed`` (2,) in something, itself or grown."""
+    """Return True if the robot, itself or grown, is deeper in something than ``allowed`` (2,)."""
     deeper: bool = (
         static_depth(pose, problem.body, problem.among, scratch) > allowed[0]
         or static_depth(pose, problem.grown, problem.among, scratch) > allowed[1]

@@ -1,4 +1,4 @@
-"""Whether a robot gets away from where it stands, and on which way it gets out of a tight place."""
+"""Search for a path on which a robot gets away from where it stands, or out of a tight place."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _PAUSED = -2
 
 
 class Room(NamedTuple):
-    """Where a robot may go."""
+    """Free space of a robot."""
 
     footprint: Footprint
     walls: ConvexObstacles
@@ -41,7 +41,7 @@ class Room(NamedTuple):
 
 
 class _Rules(NamedTuple):
-    """What an exploration tries, and what ends it."""
+    """Moves that an exploration tries, and conditions that end it."""
 
     moves: FloatArray  # (M, 2) arcs to try from each pose
     reach: float  # distance at which the robot has got away [m]

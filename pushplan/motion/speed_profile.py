@@ -61,7 +61,7 @@ def start_margin(world: World, margin: float) -> float | None:
 
 
 def goal_is_outside(world: World) -> bool:
-    """Whether the goal is a disc that lies outside the workspace, where no path can lead."""
+    """Return True if the goal is a disc that lies outside the workspace, where no path can lead."""
     goal = world.navigation_goal
     bounds = world.static.bounds
     if not isinstance(goal, GoalDisc):

@@ -1,4 +1,4 @@
-"""What a differential drive begins with where no arc leads on: a way out, and a turn."""
+"""Start of a differential drive where no arc leads on: a path out, and a turn on the spot."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What robot and objects together must be worth of work where objects have a goal."""
+"""Lower bound on the work of robot and objects for a rearrangement goal."""
 
 from __future__ import annotations
 

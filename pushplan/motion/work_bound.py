@@ -1,4 +1,4 @@
-"""What robot and objects together must be worth of work at least: a proof by branch and bound.
+"""Lower bound on the work of robot and objects together: a proof by branch and bound.
 
 A robot whose middle passes an object's middle nearer than both inscribed discs allow has moved it
 by what is missing. So each object costs a robot's path a *depth*, and the cheapest such path is
@@ -125,7 +125,7 @@ class _Relaxation:
         return self._node(np.maximum(0.0, reach - away), reach)
 
     def cost(self, node: _Node) -> float:
-        """What the path of a node costs in the relaxed problem [kg m]."""
+        """Return the cost of a node's path in the relaxed problem [kg m]."""
         return node.bound + float(self.masses @ np.maximum(0.0, node.depths - node.low))
 
     def split(self, node: _Node) -> list[_Node | None]:

@@ -88,7 +88,7 @@ def _clearance_at(
 
 
 class DiscState:
-    """Where the disc fits with the objects at some poses, and where the robot gets to.
+    """Free space of the disc with the objects at some poses, and the part that the robot reaches.
 
     Args:
         space: the space.
@@ -119,11 +119,11 @@ class DiscState:
 
     @property
     def is_open(self) -> bool:
-        """Whether the robot gets to the goal without touching anything."""
+        """True if the robot gets to the goal without touching anything."""
         return bool((self.reached & self.space.goal).any())
 
     def is_free(self, point: FloatArray) -> bool:
-        """Whether the disc fits at a point (2,)."""
+        """Return True if the disc fits at a point (2,)."""
         return bool(self.clearance[self.space.cell_of(point)] > self.space.radius)
 
     def nearest_free(self, pose: FloatArray) -> FloatArray:
@@ -136,7 +136,7 @@ class DiscState:
         return np.array([*nearest, pose[2]])
 
     def gets_to(self, point: FloatArray) -> bool:
-        """Whether the robot gets to a point (2,) without touching anything."""
+        """Return True if the robot gets to a point (2,) without touching anything."""
         return bool(self.reached[self.space.cell_of(point)])
 
     @cached_property
@@ -215,7 +215,7 @@ class DiscState:
         return points[kept]
 
     def _sees(self, a: FloatArray, b: FloatArray) -> bool:
-        """Whether the disc can go straight from a to b."""
+        """Return True if the disc can go straight from a to b."""
         count = int(np.hypot(*(b - a)) / (0.5 * self.space.cell)) + 2
         line = a + (b - a) * np.linspace(0.0, 1.0, count)[:, None]
         grid = self.space.grid

@@ -28,7 +28,7 @@ _SPACING = 0.1
 """Distance between the poses of a push [circumscribed radii]."""
 _CONTACT = 5
 """Index of the pose of a push in which the robot touches the face."""
-_LEAVING = 2.5  # how far the robot drives straight to where its disc is free [circumscribed radii]
+_LEAVING = 2.5  # length of a straight drive to where its disc is free [circumscribed radii]
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +93,7 @@ def _line_pushes(
 
 
 def suits_keyholes(world: World, config: KeyholeConfig) -> bool:
-    """Whether a `KeyholeSearch` makes sense: walls, few objects, and a robot that turns and backs.
+    """Return True if a `KeyholeSearch` suits: walls, few objects, a robot that turns and reverses.
 
     Args:
         world: the scene.
@@ -217,7 +217,7 @@ class KeyholeSearch:
         return None
 
     def _hits_wall(self, path: FloatArray) -> bool:
-        """Whether the robot gets deeper into something static on poses (N, 3) than at the first."""
+        """Return True if the robot gets deeper into walls on poses (N, 3) than at the first."""
         shape = self._bare
         scratch = np.empty_like(self._bare.vertices)
         first, *others = (static_depth(pose, shape, self._walls, scratch) for pose in owned(path))
@@ -254,7 +254,7 @@ class KeyholeSearch:
                     go_on(self._space.stopped)
 
     def _is_near(self, end: KeyholeEnd, k: int, on_path: list[int]) -> bool:
-        """Whether object ``k`` is in the way of pushes of the first object on the path."""
+        """Return True if object ``k`` is in the way of pushes of the first object on the path."""
         if not on_path or k in on_path:
             return False
         here = end.state.poses[k, :2]

@@ -26,13 +26,13 @@ from pushplan.world.checks import FloatArray
 
 
 class TreeLimits(NamedTuple):
-    """How the tree may grow."""
+    """Limits on the growth of the tree."""
 
     max_curvature: float  # greatest |curvature| of an edge [1/m]
     edge_length: float  # longest edge [m]
     spacing: float  # distance between collision checks [m]
-    turn_weight: float  # what a radian of heading error is worth in metres
-    backward: float  # how far a path may lead back in all [m]
+    turn_weight: float  # length that a radian of heading error is worth [m]
+    backward: float  # greatest total length that a path may lead back [m]
 
 
 _PLACE, _HEADING, _DRIVEN = range(3)  # the parts of a state, of which the last is:
@@ -98,7 +98,7 @@ class TreeGrowth:
     targets: Callable[[], FloatArray]  # gives the next (3,) pose to grow towards
     limits: TreeLimits  # of the edges
     shape: Footprint  # of the robot
-    among: ConvexObstacles  # what it must not touch
+    among: ConvexObstacles  # obstacles that it must not touch
 
     def __post_init__(self) -> None:
         self.scratch = np.empty_like(self.shape.vertices)

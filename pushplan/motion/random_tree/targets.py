@@ -1,4 +1,4 @@
-"""Where a tree grows: mostly near a coarse path, sometimes anywhere."""
+"""Targets towards which a tree grows: mostly near a coarse path, sometimes anywhere."""
 
 from __future__ import annotations
 

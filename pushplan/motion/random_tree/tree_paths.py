@@ -27,7 +27,7 @@ _COARSE_PATH_FRACTION = 0.8  # of the targets, that are near the coarse path at 
 _COARSE_PATH_SPREAD = 0.5  # standard deviation of those about it [R]
 _AVOID_ITERATIONS = 200  # of the tree that takes objects as obstacles
 _TREE_ITERATIONS = 1500  # of the tree that may push them
-_BACKWARD = 2.0  # how far a car may go back at first [turning radii]
+_BACKWARD = 2.0  # greatest distance that a car may go back at first [turning radii]
 _EDGES = 30
 """Edges along a coarse path up to which a tree gets its budget; in proportion more beyond."""
 
@@ -44,9 +44,9 @@ class TreePaths:
         self._exact: FloatArray | None = None
         self.trees = 0
         self.sealed = False
-        """Whether certainly no path leads to the goal."""
+        """True if certainly no path leads to the goal."""
         self.boxed_in = False
-        """Whether the robot cannot even get away from where it stands."""
+        """True if the robot cannot even get away from where it stands."""
 
     def relax(self) -> None:
         """Look farther from the coarse path, as the way out may be the other way."""

@@ -19,7 +19,7 @@ class BuiltLattice:
     frame: Frame  # in which it lies; its origin is the robot
     motions: PrimitiveSet  # its primitives
     start: tuple[int, int, float]  # row, column and heading [rad] of the robot
-    arrives: bool  # whether the goal of the lattice is that of the world, not one before it
+    arrives: bool  # True if the goal of the lattice is that of the world, not one before it
 
     def node(self, heading: int, row: int, column: int) -> int:
         """Number of a node."""

@@ -199,11 +199,11 @@ class LatticeBuilder:
 
     @property
     def _hull(self) -> int:
-        """How far the hull reaches from its origin [cells]."""
+        """Distance that the hull reaches from its origin [cells]."""
         return int(np.ceil(self.world.robot.circumscribed_radius / self.cell)) + 2
 
     def _heuristic(self, sums: FloatArray, lattice: PoseLattice) -> tuple[FloatArray, FloatArray]:
-        """What `PoseLattice` knows about the cost to a line; nothing for a disc."""
+        """Return the bounds and costs to a line for `PoseLattice`; those that it has for a disc."""
         if isinstance(self.world.goal, GoalDisc):
             return lattice.row_bounds, lattice.place_costs
         cells = self.cells

@@ -19,7 +19,7 @@ from pushplan.world.checks import FloatArray, IntArray
 
 _NEAREST = 4  # headings of the lattice that a robot between two of them may turn to
 _PATHS = 8  # paths to each of them
-_SLACK = 0.8  # how much more than the change of heading they may turn [rad]
+_SLACK = 0.8  # greatest turn beyond the change of heading [rad]
 
 
 def open_search(built: BuiltLattice, builder: LatticeBuilder) -> tuple[AStar, list[FloatArray]]:

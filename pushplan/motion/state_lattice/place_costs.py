@@ -33,10 +33,10 @@ def _drift(values: FloatArray, first: int, last: int, cost: float) -> None:
 
 
 class HullWindow(NamedTuple):
-    """What a robot is taken to cover where it crosses a row of cells."""
+    """Cells that a robot is assumed to cover where it crosses a row of cells."""
 
     half: int  # Cells to each side of the one below its origin
-    reach: int  # How far ahead of the origin it may cover cells already [cells]
+    reach: int  # Distance ahead of the origin in which it may cover cells already [cells]
     along: int  # Rows to each side over which costs are averaged; 0 for a bound
     stage: int  # Rows from one that is looked at to the next; 1 for a bound
     factor: float  # Factor on costs; at most 1 for a bound

@@ -65,7 +65,7 @@ def swath_sum(sums: FloatArray, runs: IntArray, begin: int, end: int, at: int) -
 
 @kernel
 def within(planes: FloatArray, u: int, v: int, box: FloatArray) -> bool:
-    """Whether a path whose origin stays in ``box`` around (u, v) keeps to all half planes."""
+    """Return True if a path with its origin in ``box`` around (u, v) keeps to all half planes."""
     for i in range(planes.shape[0]):
         a = planes[i, 0]
         b = planes[i, 1]
@@ -139,7 +139,7 @@ def bound_at(lattice: PoseLattice, node: int) -> float:
 
 @kernel
 def reached(lattice: PoseLattice, node: int) -> bool:
-    """Whether a node lies in the goal."""
+    """Return True if a node lies in the goal."""
     _, u, v = place_of(lattice, node)
     if lattice.goal[0] == 0.0:
         arrived: bool = u >= lattice.goal[1] - 1e-9

@@ -58,7 +58,7 @@ class PrimitiveConfig:
 class PrimitiveSet(ArrayRecord):
     """H headings and P primitives, those of one heading after those of the one before."""
 
-    config: PrimitiveConfig  # what it was made from
+    config: PrimitiveConfig  # parameters that it was made from
     angles: FloatArray  # (H,) headings [rad], increasing from 0
     first: IntArray  # (H + 1,) where the primitives of each heading start
     ends: IntArray  # (P, 3) steps along x and y, and the heading at the end
@@ -77,7 +77,7 @@ class PrimitiveSet(ArrayRecord):
 
     @functools.cached_property
     def bulge(self) -> int:
-        """How far a primitive may pass beyond the box of its two ends at most [steps]."""
+        """Greatest distance by which a primitive passes beyond the box of its two ends [steps]."""
         ends = self.ends[:, [0, 0, 1, 1]].astype(np.float64)
         box = np.where([False, True, False, True], np.maximum(ends, 0), np.minimum(ends, 0))
         return int(np.ceil(np.abs(self.boxes - box).max() - 1e-9))

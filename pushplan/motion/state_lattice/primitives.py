@@ -32,7 +32,7 @@ def fill_connections(
     target: float,  # at the end [rad]
     radius: float,  # turning radius [steps]
     reach: int,  # greatest coordinate of an end [steps]
-    slack: float,  # how much a path may turn beyond the change of heading [rad]
+    slack: float,  # greatest turn of a path beyond the change of heading [rad]
     out: FloatArray,  # (M, 9) receives length, x, y, and the three pieces of each path
 ) -> int:
     """Write the Dubins paths from the origin without needless turns; returns their number."""
@@ -67,7 +67,7 @@ def fill_connections(
 
 
 _MOST_TURN = 1.3  # greatest change of heading along one primitive [rad]
-_SLACK = 0.35  # how much more than its change of heading a primitive may turn [rad]
+_SLACK = 0.35  # greatest turn of a primitive beyond its change of heading [rad]
 
 
 def connections(heading: float, target: float, config: PrimitiveConfig, slack: float) -> FloatArray:

@@ -30,7 +30,7 @@ def swaths(
     primitives: PrimitiveSet,  # the set
     vertices: FloatArray,  # (V, 2) convex parts of the footprint in lattice steps, body frame
     offsets: IntArray,  # (Q + 1,) where each part starts
-    cells_per_step: int,  # how many cells of the map a lattice step is long
+    cells_per_step: int,  # length of a lattice step [cells of the map]
     stopped: Callable[[], bool] = never,
 ) -> Swaths:
     """Swaths of all primitives of a set, cached by everything that they depend on.
