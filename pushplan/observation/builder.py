@@ -1,4 +1,4 @@
-"""What every observation builder has; tasks, environments and networks speak of it."""
+"""Interface of observation builders, as tasks, environments and networks use it."""
 
 from __future__ import annotations
 

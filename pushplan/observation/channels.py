@@ -59,10 +59,10 @@ def fill_hidden(image: Image, view: View, source: BendDistances, per_metre: floa
 
 
 class _Sight(NamedTuple):
-    """What the robot sees of the corners that shortest paths bend at."""
+    """Data for finding the corners of shortest paths that the robot sees."""
 
     loops: FloatArray  # (V, 2) outlines that cast shadows [m]
-    offsets: IntArray  # where each begins
+    offsets: IntArray  # start of each
     table: Table  # (rows, columns, corners) distances from the corners [m]
     origin: FloatArray  # (2,) of the table [m]
     step: float  # side of its cells [m]
@@ -112,19 +112,19 @@ MOVABLE = 128
 
 
 def footprint(image: Image, view: View) -> None:
-    """Where the robot is, 255."""
+    """Draw the robot, 255."""
     robot = view.world.robot
     vertices = frozen(transform(view.world.robot_pose, robot.vertices))
     fill_parts(image, view.numbers, vertices, robot.offsets, 255)
 
 
 def movable(image: Image, view: View) -> None:
-    """What may be pushed, 255."""
+    """Draw everything that may be pushed, 255."""
     _fill_movables(image, view, 255)
 
 
 def static(image: Image, view: View) -> None:
-    """What never moves, 255."""
+    """Draw everything that never moves, 255."""
     _fill_static(image, view)
 
 

@@ -74,7 +74,7 @@ class ImageObservation(CheckedFields):
         return len(self.channels), *self.pixels
 
     def view(self, world: World) -> View:
-        """Where the pixels of the image of a world are."""
+        """Return the view of an image of a world, which says where its pixels are."""
         x, y, heading = world.robot_pose.tolist()
         up = 0.5 * math.pi if self.north_up else heading
         pose = np.array([x + self.shift * math.cos(up), y + self.shift * math.sin(up), up])

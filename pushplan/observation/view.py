@@ -96,7 +96,7 @@ def sample(
 class View:
     """A window on the world: where its pixels are."""
 
-    world: World  # what is looked at
+    world: World  # observed scene
     # (3,) middle of the window [m], and the direction [rad] that is up in the image; left in the
     # image is a quarter turn counter-clockwise from it
     pose: FloatArray
@@ -104,7 +104,7 @@ class View:
     cols: int  # [px]
     step_up: float  # length of a pixel up the image [m]
     step_across: float  # length of a pixel across it [m]
-    shift: float  # how far the middle lies up the image from the robot [m]
+    shift: float  # distance of the middle up the image from the robot [m]
 
     @cached_property
     def numbers(self) -> FloatArray:
