@@ -1,4 +1,4 @@
-"""Which sighting belongs to which track."""
+"""Assignment of sightings to tracks."""
 
 from __future__ import annotations
 

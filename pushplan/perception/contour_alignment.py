@@ -16,7 +16,7 @@ SAMPLES = 64
 
 
 class Alignments(NamedTuple):
-    """Where G shapes lie in the world, by least squares."""
+    """Placements of G shapes in the world, by least squares."""
 
     centres: Contour  # (G,) of the shapes' frames, x + iy [m]
     turns: FloatArray  # (G,) heading less the expected one, in [-pi, pi] [rad]
