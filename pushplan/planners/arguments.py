@@ -1,4 +1,4 @@
-"""What planners and policies check before they begin."""
+"""Checks that planners and policies make before they begin."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ class PlanController:
 
 
 def is_trajectory(plan: Plan) -> bool:
-    """Whether the turn rates of a plan turn it to its headings; those of a polyline do not."""
+    """Return True if the turn rates of a plan yield its headings; those of a polyline do not."""
     turns = wrap_angle(np.diff(plan.poses[:, 2]))
     by_rates = plan.turn_rates[:-1] * np.diff(plan.times)
     return bool((np.abs(wrap_angle(turns - by_rates)) <= _OFF).all())

@@ -138,12 +138,12 @@ class PlanFollower:
         self._map: StaticMap | None = None
         self._map_has_changed = False
         self._fits: StaticMap | None = None
-        """What is static that the present plan is known to be clear of."""
+        """Static map that the present plan is known to be clear of."""
         self._fruitless = FruitlessCalls()
 
     @property
     def stuck(self) -> bool:
-        """Whether all recoveries at this place are used up; plans are still made and driven."""
+        """True if all recoveries at this place are used up; plans are still made and driven."""
         return self._begun and self._recovery.stuck
 
     def act(self, world: World, observation: Any = None) -> Twist:
@@ -177,7 +177,7 @@ class PlanFollower:
         return self.controller.command(world, self.current_plan)
 
     def _is_past(self, world: World, plan: Plan) -> bool:
-        """Whether a robot that cannot stand is at the end of its plan, the next on its way."""
+        """Return True if a robot that cannot stop is at the end of its plan, the next pending."""
         if world.robot.can_stop or self._pending is None:
             return False
         return self._progress.update(plan, world.robot_pose) >= self._progress.total - 1e-9
@@ -192,7 +192,7 @@ class PlanFollower:
                 self._receive(world)
 
     def _is_waiting(self, world: World) -> bool:
-        """Whether the robot need not get on: it is there, or its first plan is on its way."""
+        """Return True if the robot may stand: it is at the goal, or its first plan is pending."""
         if self.current_plan is None:
             found_none = bool(self.plan_log) and self.plan_log[-1].plan is None
             if found_none and self._map_has_changed and self.plan_log[-1].status in _CLOSED:
@@ -227,7 +227,7 @@ class PlanFollower:
         if plan is None and reason is Reason.BLOCKED:
             held = self._clock.held
             path = stopping_path(world.robot, world.robot_pose, driven_twist(world), held, held)
-            world = world.moved(robot_pose=path[-1], robot_twist=np.zeros(3))  # where it has braked
+            world = world.moved(robot_pose=path[-1], robot_twist=np.zeros(3))  # after braking
         start, stretch = world_ahead(world, plan, now, latency, self.interaction)
         self._planned = world
         call = self._executor.submit(
@@ -262,7 +262,7 @@ class PlanFollower:
         self._tight = result.stats.detail.get("tight", 0.0) > 0.0
 
     def _keeps_old(self, world: World, new: Plan, reason: Reason) -> bool:
-        """Whether the new plan is not enough better than what is left of the old one."""
+        """Return True if the new plan is not enough better than the rest of the old one."""
         old = self.current_plan
         margin = self.replanning.margin
         if margin is None or reason.urgent or old is None:
@@ -328,7 +328,7 @@ class PlanFollower:
         return self._surprise(world, plan, slice(index, end), rested)
 
     def _free_length(self, world: World, plan: Plan) -> float:
-        """How far the rest of a plan leads before something static that it was not made for [m]."""
+        """Return the length of the plan's rest before static obstacles that are new to it [m]."""
         if self._fits is world.static:
             return math.inf
         index = self._progress.index(self._progress.update(plan, world.robot_pose))
@@ -339,7 +339,7 @@ class PlanFollower:
         return free
 
     def _reaction(self, world: World) -> float:
-        """How far the robot drives until a plan that is asked for now can be followed [m]."""
+        """Return the distance driven until a plan that is asked for now can be followed [m]."""
         robot = world.robot
         speed = abs(driven_twist(world).linear)
         braking = 0.5 * speed * speed / robot.max_acceleration
@@ -351,7 +351,7 @@ class PlanFollower:
         return self._executor.expected(self.stop) if latency is None else latency
 
     def _surprise(self, world: World, plan: Plan, part: slice, rested: bool) -> Reason | None:
-        """Whether a part of the plan would do something else than was predicted."""
+        """Return a reason to replan if a part of the plan would not do what was predicted."""
         surprise = self.replanning.surprise
         if np.isinf(surprise) and not world.static.convex_parts:
             return None  # nothing can jam
@@ -373,7 +373,7 @@ class PlanFollower:
 def _timed_call(
     planner: Planner, start: World, rng: np.random.Generator, stop: Stop | None
 ) -> PlanResult:
-    """What a planner returns, with the time that it took by our clock."""
+    """Return the result of a planner, with the time that it took by our clock."""
     began = time.perf_counter()
     result = planner.plan(start, stop=stop, rng=rng)
     took = time.perf_counter() - began

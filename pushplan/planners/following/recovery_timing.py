@@ -45,12 +45,12 @@ class RecoveryRule:
 
     @property
     def stuck(self) -> bool:
-        """Whether all recoveries at this place are used up."""
+        """True if all recoveries at this place are used up."""
         return self._count >= _MOST
 
     @property
     def is_on(self) -> bool:
-        """Whether a recovery is going on."""
+        """True while a recovery is in progress."""
         return self._recovery is not None
 
     def wait(self) -> None:

@@ -85,7 +85,7 @@ class Replanning(CheckedFields):
 
 
 def rest_of(plan: Plan, index: int, predicted: FloatArray | None) -> Plan:
-    """What is left of a plan from its pose ``index`` on.
+    """Return the rest of a plan from its pose ``index`` on.
 
     Args:
         plan: the plan.
@@ -114,7 +114,7 @@ def rest_of(plan: Plan, index: int, predicted: FloatArray | None) -> Plan:
 def sweep_rest(
     world: World, plan: Plan, index: int, interaction: InteractionModel, end: int | None = None
 ) -> tuple[Interaction, FloatArray]:
-    """What driving on from the robot's pose to the plan's poses after ``index`` would do.
+    """Predict the effect of driving from the robot's pose to the plan's poses after ``index``.
 
     Args:
         world: the world now.
@@ -137,7 +137,7 @@ def poses_at(at: FloatArray, along: FloatArray, path: FloatArray) -> FloatArray:
 
 
 def free_length(world: World, path: FloatArray) -> float:
-    """How far a path leads before the robot meets what is static [m]; inf where it does not.
+    """Return the length of a path before the robot meets static obstacles [m]; inf if it does not.
 
     Args:
         world: the scene; half of its margin counts as met.

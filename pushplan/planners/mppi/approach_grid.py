@@ -18,7 +18,7 @@ from pushplan.world.outline import inscribed_radius
 _CELL = 0.35  # side of a cell [R]
 _MOST_CELLS = 6000
 _NEAR = 2.0  # distance to the place within which the way counts as straight [R]
-# what a metre costs more within an object [metres]
+# additional cost of a metre within an object [metres]
 _TARGET = 6.0
 _OTHERS = 2.0
 _TURNS = np.radians([0.0, 25.0, -25.0, 50.0, -50.0, 75.0, -75.0])
@@ -26,7 +26,7 @@ _TURNS = np.radians([0.0, 25.0, -25.0, 50.0, -50.0, 75.0, -75.0])
 
 
 def no_approach() -> Approach:
-    """What stands for none."""
+    """Return the placeholder for no approach."""
     field = Field(np.zeros((1, 1)), 0.0, 0.0, 1.0)
     return Approach(-1, field, np.zeros(3), 0.0, 0.0, 0.0)
 

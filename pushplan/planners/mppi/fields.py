@@ -38,7 +38,7 @@ def robot_field(static: StaticMap, goal: Goal, clearance: float, cell: float) ->
 
 
 def _places(goal: ManipulationGoal, radius: float) -> ManipulationGoal | list[FloatArray]:
-    """Where the middle of an object is when it is done."""
+    """Return the places at which the middle of an object is when the object is done."""
     places = done_places(goal, radius, _INSET)
     if not places and isinstance(goal, Receptacle):  # too narrow: as deep as possible
         middle = goal.polygon.mean(axis=0)

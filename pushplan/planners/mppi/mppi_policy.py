@@ -151,7 +151,7 @@ class MppiPolicy:
 
 
 def _objective(world: World, config: MppiConfig, targets: TargetChoice) -> Objective:
-    """What a decision minimises."""
+    """Return the objective that a decision minimises."""
     if isinstance(world.goal, GoalDisc | GoalLine):
         return navigation_objective(world, config)
     return manipulation_objective(world, config, targets.approach(world))

@@ -1,4 +1,4 @@
-"""What a decision minimises: costs of rollouts, for a goal of the robot or one of the objects."""
+"""Objectives of a decision: costs of rollouts, for a goal of the robot or one of the objects."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def navigation_objective(world: World, config: MppiConfig) -> Objective:
 
 
 def object_costs(world: World, config: MppiConfig) -> ObjectCosts:
-    """What is left to do for the objects, as kernels read it.
+    """Return the remaining cost of the objects, as kernels read it.
 
     Bringing an object one metre nearer costs m₀ + w mᵢ. Each object that is not done costs as much
     as driving half across the map on top: without that a robot that has just finished one would

@@ -42,7 +42,7 @@ class Approach(NamedTuple):
 
 
 class ObjectCosts(NamedTuple):
-    """What is left to do for the objects."""
+    """Remaining cost of the objects."""
 
     field: Field  # Way of an object's middle to where it is done
     weights: FloatArray  # (K,) cost of a metre of it [kg]; 0 for objects that do not count

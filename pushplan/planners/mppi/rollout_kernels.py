@@ -16,11 +16,11 @@ from pushplan.world.checks import FloatArray, IntArray
 DRIVEN = 0
 REACHED = 1
 BLOCKED = 2
-"""How a rollout ends: at the horizon, in the goal, or at something static or jammed."""
+"""Ends of a rollout: at the horizon, in the goal, or at something static or jammed."""
 
 
 class DriveLimits(NamedTuple):
-    """What the robot can do within one step."""
+    """Limits on the robot's motion within one step."""
 
     min_speed: float  # [m/s]
     max_speed: float
@@ -31,7 +31,7 @@ class DriveLimits(NamedTuple):
 
 
 class RolloutProblem(NamedTuple):
-    """What rollouts of the robot depend on."""
+    """Robot, static obstacles and goal of rollouts."""
 
     period: float  # Length of a step [s]
     substeps: int  # Poses in a step
@@ -39,7 +39,7 @@ class RolloutProblem(NamedTuple):
     footprint: Footprint
     walls: ConvexObstacles
     goal: FloatArray  # (5,) from `goal_numbers`
-    has_goal: bool  # Whether a rollout ends in ``goal``; False where objects have the goal
+    has_goal: bool  # True if a rollout ends in ``goal``; False where objects have the goal
     allowed: float  # Depth in what is static at the start [m]; a rollout may get out of it
 
 
@@ -74,7 +74,7 @@ def _towards(last: float, wanted: float, change: float) -> float:
 
 @kernel
 def _blocked(pose: FloatArray, problem: RolloutProblem, corners: FloatArray) -> bool:
-    """Whether the robot cannot be there."""
+    """Return True if the robot cannot be at a pose."""
     if is_free(pose, problem.footprint, problem.walls, corners):
         return False
     if problem.allowed <= 0.0:

@@ -15,7 +15,7 @@ from pushplan.world import World
 from pushplan.world.checks import FloatArray
 
 _GAIN = 0.25  # by how much the way has to get shorter to count as progress [R]
-_PUSHED = 3.0  # how much more a metre of the object counts than one of the robot
+_PUSHED = 3.0  # weight of a metre of the object, relative to one of the robot
 
 
 class TargetChoice:
@@ -73,7 +73,7 @@ class TargetChoice:
         return place_behind(world, k, math.atan2(dy, dx), failed)
 
     def _gets_on(self, world: World, k: int, place: FloatArray) -> bool:
-        """Whether the way to the object and the way of it have got shorter lately."""
+        """Return True if the paths to the object and of the object have become shorter lately."""
         robot = world.robot
         size = robot.circumscribed_radius
         now = _way(world, k, place) + _PUSHED * _way_of_object(world, k).length

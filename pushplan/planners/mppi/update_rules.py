@@ -1,4 +1,4 @@
-"""How samples and their costs change the distribution that controls are drawn from."""
+"""Updates of the distribution of controls from samples and their costs."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ _PATIENCE = 1.0  # time for which an object has to stop the robot [s]
 
 
 class Movability:
-    """What is believed of the objects of one episode.
+    """Belief about which objects of one episode can be moved.
 
     An object is held not to move where the world says so, until that leaves no way
     (`drop_prior`), or where it has stopped the robot that drove against it, which is the evidence;

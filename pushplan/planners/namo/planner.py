@@ -114,7 +114,7 @@ class Namo:
         )
 
     def _straight(self, call: PlanningCall, pushes: int, *, wanted: bool) -> PlanResult | None:
-        """What the navigator finds after some pushes were simulated; None if it is not asked."""
+        """Ask the navigator for a plan after some simulated pushes; None if it is not asked."""
         budget = self.config.straight_iterations
         if not (budget or wanted):
             return None
@@ -135,7 +135,7 @@ def _cost(plan: Plan | None, weight: float) -> float:
 
 
 class _Rest(Stop):
-    """What is left of the stop rule of a call after some iterations."""
+    """Rest of the stop rule of a call after some iterations."""
 
     def __init__(self, call: PlanningCall, iterations: int) -> None:
         self._call = call
@@ -147,5 +147,5 @@ class _Rest(Stop):
 
     @property
     def cancelled(self) -> bool:
-        """Whether the call was cancelled."""
+        """True if the call was cancelled."""
         return self._call.cancelled

@@ -32,7 +32,7 @@ from pushplan.world.checks import FloatArray, IntArray
 
 
 class Branching(NamedTuple):
-    """How nodes are expanded."""
+    """Parameters of the expansion of nodes."""
 
     curvatures: FloatArray  # (C,) [1/m]
     length: float  # of an edge [m]
@@ -64,7 +64,7 @@ def make_search(
 
 @kernel
 def _signature(objects: FloatArray, start: FloatArray, radii: FloatArray, count: int) -> int:
-    """Which objects have been moved, folded into a number below ``count``."""
+    """Fold the set of objects that have been moved into a number below ``count``."""
     if count == 1:
         return 0
     code = np.int64(0)
@@ -204,7 +204,7 @@ def _successors(
 
 @kernel
 def _estimate(lattice: PushLattice, number: int) -> float:
-    """What is left to pay; the arc of a guess is paid when it is driven."""
+    """Return the estimated cost to go; the arc of a guess is paid when it is driven."""
     tree = lattice.tree
     node = number >> 1
     paid = tree.costs[node] if number % 2 == 1 else tree.costs[tree.parents[node]]
@@ -214,7 +214,7 @@ def _estimate(lattice: PushLattice, number: int) -> float:
 
 @kernel
 def _reached(lattice: PushLattice, number: int) -> bool:
-    """Whether a driven node lies in the goal."""
+    """Return True if a driven node lies in the goal."""
     pose = lattice.tree.poses[number >> 1]
     return number % 2 == 1 and in_goal(pose[0], pose[1], lattice.problem.goal)
 

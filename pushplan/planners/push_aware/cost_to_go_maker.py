@@ -37,7 +37,7 @@ class CostToGoMaker:
         static: StaticMap,  # the map
         goal: NavigationGoal,
         radius: float,  # least turning radius [m]
-        inset: float,  # how far into the goal paths end [m]
+        inset: float,  # depth in the goal at which paths end [m]
     ) -> None:
         size = robot.circumscribed_radius
         self._goal = goal_numbers(goal, inset)
@@ -47,7 +47,7 @@ class CostToGoMaker:
         least = float(np.sqrt(extent[0] * extent[1] / _MOST_CELLS))
         cell = max(_CELL * size, least, float(extent.max()) / _MOST_CELLS)
         self.useful = cell <= _COARSEST * size
-        """Whether a table of bearable size resolves the robot."""
+        """True if a table of bearable size resolves the robot."""
         cols, rows = (max(1, int(np.ceil(side / cell))) if self.useful else 1 for side in extent)
         self._length = _ARC * cell
         self._center = np.array([-1, -1])

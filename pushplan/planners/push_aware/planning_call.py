@@ -37,7 +37,7 @@ _LARGE_TURN = 0.5  # turn on the spot from which on arcs without it are a detour
 
 @dataclass(frozen=True)
 class _SearchVariant:
-    """How one search of the lattice differs from another."""
+    """Settings in which one search of the lattice differs from another."""
 
     arc: float
     curvatures: int
@@ -62,7 +62,7 @@ class PushAwareSearch:
         self.size = improver.size
         self.expansions = self.searches = self.random_arcs = 0
         self.bound = 0.0
-        """What no plan can cost less than [kg m]."""
+        """Lower bound on the cost of every plan [kg m]."""
         self._radius = improver.problem.turning_radius
         self._patience = _FIRST_SEARCH
         self._nodes: PushTree | None = None
@@ -169,7 +169,7 @@ class PushAwareSearch:
         )
 
     def _cost_ratio(self, table: CostToGo) -> float:
-        """What the best plan costs, over what its path would cost without objects, at most 2.
+        """Return the cost of the best plan over that of its path without objects, at most 2.
 
         Among many objects the rest of a path costs so much more than its length, too, and a
         search that knows wastes no time on what only looks cheap.

@@ -17,10 +17,10 @@ from pushplan.world.outline import flatten
 SAMPLES = 4
 """Poses checked along one command."""
 HALVINGS = 4
-"""How often the piece in which it comes too near is halved."""
+"""Number of halvings of the piece in which robot or box comes too near."""
 GRAZE = 0.1
-"""How fast a box that is nearer than the clearance may come nearer, per travel of the bumper: it is
-pushed along a wall, and lies against it in the end."""
+"""Greatest rate at which a box nearer than the clearance may come nearer, per travel of the bumper:
+it is pushed along a wall, and lies against it in the end."""
 
 
 class ClearanceProblem(NamedTuple):
@@ -31,7 +31,7 @@ class ClearanceProblem(NamedTuple):
     offsets: IntArray  # (P + 1,) where each part starts; the last is the box
     radii: FloatArray  # (P,) of the disc about the origin that holds each part [m]
     least: float  # Distance to keep [m]
-    slack: float  # What is nearer than that already may come this much nearer [m]
+    slack: float  # Distance by which a body that is too near already may come nearer [m]
     placed: FloatArray  # (V, 2)
     box: FloatArray  # (3,)
     states: FloatArray  # (2, 6)
@@ -125,7 +125,7 @@ def _clear(
     box: float,
     travel: float,
 ) -> bool:
-    """Whether robot and box keep their distances; a box near a wall may graze along it."""
+    """Return True if robot and box keep their distances; a box near a wall may graze along it."""
     here = gaps(contact, normal, state, problem, obstacles)
     graze = GRAZE * travel if box < problem.least else 0.0
     return here[0] >= robot and here[1] >= box - graze

@@ -52,7 +52,7 @@ class PushingProblem(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What an assembly fills, and its memory; n = 2 M."""
+    """Arrays that an assembly fills, and its scratch memory; n = 2 M."""
 
     jacobian: FloatArray  # (6 N, n)
     residual: FloatArray  # (6 N,)

@@ -44,7 +44,7 @@ from pushplan.world import Drive, InvalidInputError, Plan, RobotModel, Twist, Wo
 from pushplan.world.checks import FloatArray, IntArray, expect
 from pushplan.world.outline import convex_outline
 
-_NEARER = 1e-6  # what is nearer than the clearance already may come this much nearer [R]
+_NEARER = 1e-6  # distance by which a body within the clearance may come nearer [R]
 
 
 @dataclass

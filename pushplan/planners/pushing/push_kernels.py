@@ -31,7 +31,7 @@ from pushplan.world.checks import FloatArray, IntArray
 
 _BACK = 0.5
 _WINDOW = 2.0
-"""How far the box's place may move back or ahead from one call to the next [L]."""
+"""Greatest move of the box's place, back or ahead, from one call to the next [L]."""
 _LEAST = 0.4
 """Least speed of a push that has not ended, as a fraction of the greatest, or of that at which the
 robot can turn within the distance to the box."""
@@ -67,7 +67,7 @@ class PushingMemory(NamedTuple):
     assembly: Memory
     clearance: ClearanceProblem
     groups: IntArray  # (N,) which of the M commands holds in each step
-    reach: float  # How far the steps reach at full speed [L]
+    reach: float  # Reach of the steps at full speed [L]
     delay: float  # Between a command and its effect [s]
     gain: float  # Fraction by which an observation corrects what was predicted
     face: IntArray  # (1,) the one that is pushed

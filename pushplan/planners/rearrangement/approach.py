@@ -32,8 +32,8 @@ _LONGEST = 6
 """Points further on that a leg may end at, where the robot has to keep to the lattice's path."""
 _MORE = 1.5  # By this factor a route may cost more than the lattice's path, and a radius
 _AWAY = (0.3, -0.3, 0.6, -0.6, 1.0, -1.0)
-"""How far ahead the robot may drive first, to get to where it can turn, and off an object that it
-has just pushed [circumscribed radii]."""
+"""Distances that the robot may drive ahead first, to get to where it can turn, and off an object
+that it has just pushed [circumscribed radii]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,11 +29,11 @@ _HARD_OBJECTS = 3
 _ADVANCE = 0.6
 """By how much of the way that the robot drives an object has to get on, to be pushed at all."""
 _EARLY = 0.6
-"""How far before something goes wrong a push ends that does not get home
-[circumscribed radii]."""
+"""Distance before a failure at which a push ends that does not deliver its object [circumscribed
+radii]."""
 _DETOUR = 1.3
-"""How many times as far as the nearest edge of an area one may be that an object is pushed
-across."""
+"""Greatest distance to an edge across which an object is pushed out of an area, in distances to the
+nearest edge."""
 GAIN = 1.0
 """By how much less has to be left to be done for a push to help that does not get its object home
 [circumscribed radii]."""
@@ -68,7 +68,7 @@ def delivering_pushes(scene: PushScene, objects: Sequence[int]) -> list[Push]:
 
 
 def can_be_pushed(scene: PushScene, k: int, horizon: float) -> bool:
-    """Whether some push gets object ``k`` home, or on towards its goal where that is far away.
+    """Return True if some push delivers object ``k``, or advances it where the goal is far away.
 
     Args:
         scene: the scene.

@@ -23,7 +23,7 @@ class PushingController(NamedTuple):
     turn: float  # Greatest turn in one step [rad]
     size: float  # Circumscribed radius of the robot [m]
     half: float  # Half the width of the bumper [m]
-    front: float  # How far the bumper is ahead of the robot's origin [m]
+    front: float  # Distance of the bumper ahead of the robot's origin [m]
     ahead: float  # Look-ahead distance of the object on its path [m]
     gain: float
     """Curvature of the robot's path for each radian that it is off its heading, times ``size``."""
@@ -66,7 +66,7 @@ def along_path(
 
 @kernel
 def is_on_bumper(robot: FloatArray, target: FloatArray, controller: PushingController) -> bool:
-    """Whether the middle of an object at a pose (3,) is in front of the bumper."""
+    """Return True if the middle of an object at a pose (3,) is in front of the bumper."""
     gx = target[0] - robot[0]
     gy = target[1] - robot[1]
     c = math.cos(robot[2])
@@ -82,7 +82,7 @@ def steer_push(
     target: FloatArray,  # (3,) pose of the target object
     path: FloatArray,  # (M, 2) for its middle [m]
     reached: float,  # arc length that it has got to [m]
-    shift: float,  # how far the robot's middle is meant to be to the left of the object [m]
+    shift: float,  # wanted offset of the robot's middle to the left of the object [m]
     controller: PushingController,
 ) -> tuple[float, float, float, bool]:
     """Step [m], turn [rad], arc length now [m], and whether the object is still on the bumper."""

@@ -8,7 +8,7 @@ from pushplan.compiled import kernel
 from pushplan.world.checks import FloatArray, IntArray
 
 MAX_OBJECTS = 62
-"""How many objects a set in one machine word can hold."""
+"""Number of objects that a set in one machine word can hold."""
 MAX_EXACT = 11
 """Up to so many objects every completion is computed exactly."""
 

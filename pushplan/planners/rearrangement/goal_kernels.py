@@ -13,7 +13,7 @@ from pushplan.interaction.kernels import Bodies
 from pushplan.world.checks import BoolArray, FloatArray
 
 REMOVED = 1e7
-"""Where an object is put that a receptacle has taken [m]."""
+"""Coordinate of an object that a receptacle has taken [m]."""
 
 
 class ObjectGoal(NamedTuple):
@@ -22,13 +22,13 @@ class ObjectGoal(NamedTuple):
     polygon: FloatArray  # (N, 2) the area that objects have to leave, or get into
     edges: FloatArray
     """(E, 3) unit normal and offset of the edges within which a delivered object lies."""
-    is_receptacle: bool  # Whether objects have to get into the polygon, and are removed there
+    is_receptacle: bool  # True if objects have to get into the polygon, and are removed there
     slack: float  # By how much an object has to be clear of the polygon's edge [m]
 
 
 @kernel
 def _may_be_done(x: float, y: float, goal: ObjectGoal) -> bool:
-    """Whether an object with its middle at (x, y) could be where it belongs."""
+    """Return True if an object with its middle at (x, y) could be where it belongs."""
     if goal.is_receptacle:
         for e in range(goal.edges.shape[0]):
             if goal.edges[e, 0] * x + goal.edges[e, 1] * y > goal.edges[e, 2]:
@@ -48,7 +48,7 @@ def _may_be_done(x: float, y: float, goal: ObjectGoal) -> bool:
 
 @kernel(allocates=True)
 def is_done(k: int, poses: FloatArray, bodies: Bodies, goal: ObjectGoal) -> bool:
-    """Whether object ``k`` is where it belongs."""
+    """Return True if object ``k`` is where it belongs."""
     if poses[k, 0] >= 0.5 * REMOVED:
         return True
     if not _may_be_done(poses[k, 0], poses[k, 1], goal):

@@ -22,8 +22,8 @@ from pushplan.planners.rearrangement.rearrangement_policy import RearrangementPo
 from pushplan.world import StaticMap, Twist, World
 from pushplan.world.checks import FloatArray
 
-_OPTIONS = 8  # how many places to push a box from are tried before the first comes again
-_RETREAT = 0.6  # how far the robot backs off after a push [circumscribed radii]
+_OPTIONS = 8  # places to push a box from that are tried before the first comes again
+_RETREAT = 0.6  # distance that the robot backs off after a push [circumscribed radii]
 _WAIT = 1.5  # time after which it looks again where it can get at no box [s]
 _STARTS = sorted(
     (
@@ -33,8 +33,8 @@ _STARTS = sorted(
     ),
     key=lambda option: 2.0 * abs(option[0]) + abs(option[1]),
 )
-"""Where to begin, in order of preference: turn against the shortest path [rad], and how far the
-robot's middle is to the left of the object's, as a fraction of half the bumper's width."""
+"""Starts of a push, in order of preference: turn against the shortest path [rad], and offset of the
+robot's middle to the left of the object's, as a fraction of half the bumper's width."""
 _PATHS = ((0.7, False), (0.0, False), (0.0, True))
 """Paths of an object: the clearance that it keeps where there is room [radii of the object], and
 whether it goes to the middle of a receptacle."""
@@ -136,7 +136,7 @@ class GreedyPusher(RearrangementPolicy):
 
 @dataclass(frozen=True)
 class LineUp:
-    """Where to begin a push.
+    """Start of a push, and the legs that lead there.
 
     Args:
         path: of the object.

@@ -29,7 +29,7 @@ from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.world import InvalidInputError, Plan, PlanningExecutor, Stop, Twist, World
 from pushplan.world.checks import FloatArray, expect
 
-_RETREAT = 0.3  # how far the robot backs off where it is stuck [circumscribed radii]
+_RETREAT = 0.3  # distance that the robot backs off where it is stuck [circumscribed radii]
 
 
 class GtspMpc(RearrangementPolicy):
@@ -258,6 +258,6 @@ class GtspMpc(RearrangementPolicy):
 
 
 def _alike(one: PushScene, other: PushScene) -> bool:
-    """Whether nothing has moved in between."""
+    """Return True if nothing has moved between two scenes."""
     same = np.array_equal(one.world.movables.ids, other.world.movables.ids)
     return same and bool(np.hypot(*(one.poses - other.poses)[:, :2].T).max() < 0.05 * one.size)

@@ -23,7 +23,7 @@ from pushplan.world import ClearanceArea, Goal, Receptacle, RobotModel, StaticMa
 from pushplan.world.checks import BoolArray, FloatArray
 
 _INSET = 1.05  # distance of an object from the edges of a receptacle when it is done [radii]
-_KEPT = 20_000  # how many lengths and paths are kept
+_KEPT = 20_000  # greatest number of lengths and paths that are kept
 _MOST_CELLS = 160  # along the longer side of a map
 
 

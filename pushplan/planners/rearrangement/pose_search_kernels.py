@@ -14,12 +14,12 @@ from pushplan.compiled import kernel
 from pushplan.planners.rearrangement.pose_grid_kernels import LENGTHS, MOVES, TURNS, PoseGrid
 from pushplan.world.checks import FloatArray, IntArray
 
-_BUCKETS = 1024  # how many buckets of poses a search has in one round
+_BUCKETS = 1024  # buckets of poses of a search in one round
 _WIDTH = 0.1  # costs that one bucket spans [cells]
 
 
 class PoseSearchProblem(NamedTuple):
-    """What `search_poses` solves."""
+    """Input of `search_poses`."""
 
     starts: IntArray  # (S,) flat indices of poses
     costs: FloatArray  # (S,) what it costs to be there [m]
@@ -27,7 +27,7 @@ class PoseSearchProblem(NamedTuple):
     depths: FloatArray  # (16, rows, columns) depth in the objects, from `add_layers` [m]
     touch: FloatArray  # (16, rows, columns) weights of the objects, likewise
     turn_cost: float  # Cost of a turn [m/rad]
-    arm: float  # How far a turn carries an object along [m/rad]
+    arm: float  # Distance by which a turn carries an object along [m/rad]
     targets: IntArray  # Flat indices of poses after which to stop; none to go on to the end
 
 

@@ -76,7 +76,7 @@ class Push(ArrayRecord):
 
 
 def signature(push: Push) -> tuple[object, ...]:
-    """What a push is known by when it has failed."""
+    """Return the key by which a failed push is recognised."""
     heading = math.remainder(float(push.start[2]), 2.0 * math.pi)
     if push.controller == "arc":
         return push.target, push.controller, round(heading / 0.6)
@@ -85,7 +85,7 @@ def signature(push: Push) -> tuple[object, ...]:
 
 @dataclass
 class PushHistory:
-    """What has been tried since something was done last, and what that adds to costs.
+    """Record of what has been tried since the last success, and its penalties on costs.
 
     Args:
         failures: how often a push has failed, or was a relocation that is not to come next again,
@@ -97,7 +97,7 @@ class PushHistory:
     relocations: Counter[int] = field(default_factory=Counter)
 
     def penalty(self, push: Push, config: RearrangementConfig) -> float:
-        """What is added to the cost of a push [circumscribed radii]."""
+        """Return the penalty on the cost of a push [circumscribed radii]."""
         failures = self.failures[signature(push)]
         relocations = self.relocations[push.target] if push.relocates else 0
         if failures >= config.max_failures or relocations >= config.max_relocations:

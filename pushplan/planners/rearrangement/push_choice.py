@@ -37,7 +37,7 @@ from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import path_length, path_lengths
 from pushplan.world.stop import wants_own_budget
 
-# how far a scene may be from the predicted one [circumscribed radii]
+# greatest distance of a scene from the predicted one [circumscribed radii]
 _ROBOT = 0.5
 _OBJECT = 0.2
 _MOST_APPROACHES = 150
@@ -64,7 +64,7 @@ class SimulatedPush:
 
 @dataclass(frozen=True, eq=False)
 class PushChoice:
-    """What was chosen.
+    """Result of choosing a push.
 
     Args:
         graph: the candidate pushes.
@@ -98,7 +98,7 @@ class PendingChoice:
     ahead: bool = False
 
     def fits(self, scene: PushScene) -> bool:
-        """Whether what was chosen is good for the scene that has come."""
+        """Return True if the choice is good for the scene that has come."""
         if not self.ahead:
             return True
         then = self.scene

@@ -126,10 +126,10 @@ Pusher = Callable[[PushScene, float], Twist | None]
 
 
 class ExecutionEnd(enum.Enum):
-    """How an execution ended."""
+    """Outcome of an execution."""
 
     DONE = "done"
-    """What it was for is where it belongs, or has been relocated."""
+    """The target is where it belongs, or has been relocated."""
     FAILED = "failed"
     """The push did not do what it was for."""
     STUCK = "stuck"
@@ -242,7 +242,7 @@ class PushExecution:
         return True
 
     def _choose_pusher(self, scene: PushScene, held: float) -> Pusher:
-        """What drives the push: along its poses, its line or the path of its object."""
+        """Return the controller of the push, for its poses, its line or the path of its object."""
         push = self.push
         config = scene.config
         world = scene.world

@@ -19,11 +19,11 @@ from pushplan.planners.rearrangement.short_arc_kernels import push_to
 from pushplan.world.checks import BoolArray, FloatArray
 
 STAGES = 8
-"""How many stages of one push are kept."""
+"""Number of stages of one push that are kept."""
 
 
 class RolloutLog(NamedTuple):
-    """What a rollout is written into."""
+    """Arrays into which a rollout is written."""
 
     track: FloatArray  # (T, 3) the robot's poses
     steps: FloatArray  # (STAGES,) how many poses each stage has
@@ -97,7 +97,7 @@ def _update_done(memory: _Memory, problem: PushRollout, box: FloatArray, margin:
 
 @kernel
 def _is_wanting(wanted: BoolArray, done: BoolArray) -> bool:
-    """Whether something that is wanted is not done."""
+    """Return True if something that is wanted is not done."""
     for k in range(wanted.shape[0]):
         if wanted[k] and not done[k]:
             return True

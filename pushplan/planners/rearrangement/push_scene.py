@@ -69,11 +69,11 @@ _LEAST_CELL = 0.012
 _STEP = 0.08
 """Distance between two commands of a predicted push."""
 _MOST_STEPS = 5000
-"""How many of them a predicted push has at most."""
+"""Greatest number of commands in a predicted push."""
 _CURVATURE = 1.5
 """Of the robot's path where it steers most [1 / circumscribed radius]."""
 _ARM = 0.8
-"""How far a turn by one radian carries an object along."""
+"""Distance by which a turn of one radian carries an object along."""
 _SLACK = 0.05
 """Clearance between the bumper and the object where a push begins."""
 MARGIN = 0.03
@@ -110,7 +110,7 @@ class SearchBudget:
 
     @property
     def is_over(self) -> bool:
-        """Whether the search has to return."""
+        """True if the search has to return."""
         stopped = self._check is not None and self._check(self.used, self.cost)
         if stopped or self.used >= _HARDEST * self._most:
             self._over = self.interrupted = True
@@ -118,7 +118,7 @@ class SearchBudget:
 
     @property
     def is_used_up(self) -> bool:
-        """Whether to choose among the pushes that are known."""
+        """True if the budget is used up, so that one of the known pushes has to be chosen."""
         if self.is_over or self.used >= self._most:
             self.interrupted = True
             return True
@@ -188,7 +188,7 @@ def initial_heading(path: FloatArray, ahead: float) -> float:
 
 
 def pose_distance(pose: FloatArray, other: FloatArray, size: float) -> float:
-    """How far two poses (3,) of an object are apart, turns included, in units of ``size``."""
+    """Return the distance between two poses (3,) of an object, turns included, in ``size``."""
     turn = math.remainder(float(pose[2] - other[2]), 2.0 * math.pi)
     return math.dist(pose[:2], other[:2]) / size + 0.2 * abs(turn)
 
@@ -272,7 +272,7 @@ class PushScene:
 
     @cached_property
     def front(self) -> float:
-        """How far the bumper is ahead of the robot's origin [m]."""
+        """Distance of the bumper ahead of the robot's origin [m]."""
         return float(self.world.robot.vertices[:, 0].max())
 
     @cached_property
@@ -331,7 +331,7 @@ class PushScene:
 
     @property
     def arm(self) -> float:
-        """How far a turn carries an object along [m/rad]."""
+        """Distance by which a turn carries an object along [m/rad]."""
         return _ARM * self.size
 
     @cached_property
@@ -430,7 +430,7 @@ class PushScene:
         return self.object_paths.path(self.poses[k, :2], radius, clearance, deep)
 
     def push_cost_to_go(self, k: int) -> PushCostToGo:
-        """What it costs to push objects of the size of object ``k`` to their goal."""
+        """Return the cost to push objects of the size of object ``k`` to their goal."""
         world = self.world
         return push_cost_to_go(
             world.robot,
@@ -460,12 +460,12 @@ class PushScene:
         return _fit_of(self.world.robot, self.world.static, _LEAST_MARGIN * self.size)
 
     def fits(self, pose: FloatArray) -> bool:
-        """Whether the robot fits at a pose (3,) among what is static."""
+        """Return True if the robot fits at a pose (3,) among static obstacles."""
         shape, among = self._fit
         return bool(is_free(pose, shape, among, np.empty_like(shape.vertices)))
 
     def is_clear(self, pose: FloatArray) -> bool:
-        """Whether the robot at a pose (3,) overlaps no object."""
+        """Return True if the robot at a pose (3,) overlaps no object."""
         movables = self.movables
         robot = self.world.robot
         away = np.hypot(*(self.poses[:, :2] - pose[:2]).T)

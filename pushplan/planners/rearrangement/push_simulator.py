@@ -240,7 +240,7 @@ def resimulate(
     poses: FloatArray | None = None,
     spent: FloatArray | float = 0.0,
 ) -> list[Push]:
-    """What a push would come to from another start, or after something has been moved.
+    """Simulate a push from another start, or after something has been moved.
 
     A relocation has to get its target where it was to be relocated to, or half the way on a path.
 

@@ -50,15 +50,15 @@ _SPREAD = np.array([0.8191725134, 0.6710436067, 0.5497004779])
 """Steps of an additive recurrence that fills a cube evenly (Roberts 2018)."""
 _MOST_ALIKE = 3  # so many states with the object in the same place are driven on from
 _DEARER = 2.0
-"""How much more than the best drive found others may cost that are still looked for."""
+"""Factor on the cost of the best drive found, up to which others are still looked at."""
 _ENOUGH = 24
 """Margins, over all sides from which a drive helps, after which the search ends."""
 _MOST_SIDES = 20  # so many drives are kept, each from another side
 _HORIZON = 3.0
-"""How far a push goes by which it is seen that the object can be pushed home."""
+"""Length of a push that shows that the object can be delivered."""
 _LEAST_MOVE = 0.15  # by so much an object has to be moved for it to count
-_SPACING = 0.05  # how far an object moves on until it is looked at anew
-_NEAR = 8.0  # what is farther from the object does not count for the search
+_SPACING = 0.05  # distance that an object moves on until it is looked at anew
+_NEAR = 8.0  # distance from the object beyond which nothing counts for the search
 
 
 def relocating_pushes(
@@ -99,7 +99,7 @@ def relocating_pushes(
 
 @dataclass(frozen=True, eq=False)
 class _State:
-    """Where some arcs have led to.
+    """State that some arcs have led to.
 
     Args:
         before: where the last arc began; None for a start.
@@ -163,7 +163,7 @@ class _RelocationSearch:
         self._seen: set[_Cell] = set()
         self._states: list[_State] = []
         self._failing: dict[_Cell, int] = {}
-        """How many of the margins a push home from a place does not stand, by place."""
+        """Number of the margins that a push home from a place does not tolerate, by place."""
 
     def run(self) -> list[Primitive]:
         """Drives, each with the cost of what it leaves to be done [m]."""
@@ -304,7 +304,7 @@ class _RelocationSearch:
         return np.where(gone, 0.0, self._cost_to_go.along(poses))
 
     def _failing_margins(self, state: _State) -> int:
-        """How many of the margins a push home from where a state has the object does not stand."""
+        """Count the margins that a push home from the object's place does not tolerate."""
         config = self._config
         if not self._delivers(state, np.zeros(3)):
             return len(config.margins)
@@ -314,7 +314,7 @@ class _RelocationSearch:
         return 0
 
     def _delivers(self, state: _State, by: FloatArray) -> bool:
-        """Whether a push gets the object home from where it is in a state, moved by an error."""
+        """Return True if a push delivers the object from its place, displaced by an error."""
         scene = self._scene
         k = self._k
         poses = np.array(state.poses)

@@ -20,7 +20,7 @@ Primitive = tuple[FloatArray, float, dict[int, FloatArray]]
 
 @dataclass(frozen=True, eq=False)
 class Rollout:
-    """What a push came to.
+    """Result of a simulated push.
 
     Args:
         track: (T, 3) the robot's poses.
@@ -44,12 +44,12 @@ class _Entry:
     before: FloatArray
     """Their poses then."""
     moved: IntArray
-    """Which of them were moved."""
+    """Indices in ``near`` of those that were moved."""
     age: int = 0
 
 
 class Asked(NamedTuple):
-    """What a search for relocations of an object depends on."""
+    """Key of a search for relocations of an object: everything that it depends on."""
 
     around: bytes  # Objects near it, and where they are
     robot: bytes  # About where the robot is
@@ -87,7 +87,7 @@ class RolloutCache:
         self.searches += 1
 
     def is_from_elsewhere(self, robot: bytes) -> bool:
-        """Whether drives were searched when the robot was in another place."""
+        """Return True if drives were searched when the robot was in another place."""
         return any(known.robot != robot for known, _ in self._relocations.values())
 
     def __len__(self) -> int:

@@ -23,11 +23,11 @@ _TIGHT_COST = 25.0
 
 
 class RouteProblem(NamedTuple):
-    """What motions cost."""
+    """Costs of motions."""
 
     step: float  # Distance of the poses that are looked at [m]
     turn_cost: float  # Of a turn [m/rad]
-    arm: float  # How far a turn carries an object along [m/rad]
+    arm: float  # Distance by which a turn carries an object along [m/rad]
     shape: Footprint  # With the margin that objects cost from
     tight: Footprint  # With the margin that walls are kept from
     among: ConvexObstacles
@@ -38,7 +38,7 @@ class RouteProblem(NamedTuple):
 
 @kernel(allocates=True)
 def _object_depth(pose: FloatArray, problem: RouteProblem, body: FloatArray) -> tuple[float, float]:
-    """How deep the footprint is in the objects [m], and the weights of those it is in."""
+    """Return the depth of the footprint in the objects [m], and the weights of those it is in."""
     shape = problem.shape
     poses = problem.poses
     bodies = problem.bodies
@@ -142,8 +142,8 @@ def cheapest_legs(
     points: FloatArray,  # (N, 2), the first is where the robot is
     heading: float,  # of the robot there [rad]
     end: float,  # heading to turn to at the last [rad]
-    first: int,  # how many of the first points a leg to any other may begin at
-    longest: int,  # how many points further on a leg from another may end
+    first: int,  # number of the first points, from which a leg to any other may begin
+    longest: int,  # greatest number of points that a leg from another may skip to
     problem: RouteProblem,
 ) -> tuple[FloatArray, IntArray, FloatArray]:
     """Costs of ending ahead and back; the row before each row (2 i, 2 i + 1); turns (2 N, 2)."""

@@ -38,7 +38,7 @@ def push_to(
 
 @kernel
 def _has_moved(before: FloatArray, after: FloatArray, size: float, least: float) -> bool:
-    """Whether two poses of an object differ by at least ``least``, see `pose_distance`."""
+    """Return True if two poses of an object differ by at least ``least``, see `pose_distance`."""
     moved = math.sqrt((after[0] - before[0]) ** 2 + (after[1] - before[1]) ** 2) / size
     return bool(moved + 0.2 * abs(wrap_angle(after[2] - before[2])) >= least)
 

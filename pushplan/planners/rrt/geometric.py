@@ -192,7 +192,7 @@ class _GoalRegion(base.GoalSampleableRegion):
 
 @kernel(allocates=True)
 def _near(point: FloatArray, among: ConvexObstacles, radius: float) -> bool:
-    """Whether a disc about ``point`` (2,) touches an obstacle."""
+    """Return True if a disc about ``point`` (2,) touches an obstacle."""
     x = point[0]
     y = point[1]
     for s in range(among.boxes.shape[0]):

@@ -1,4 +1,4 @@
-"""What it costs to run over a floe, before anything is known about the path."""
+"""Cost of running over a floe, before anything is known about the path."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ class NearbyObjects:
         cls,
         world: World,
         normal: FloatArray,  # (2,) direction towards the goal
-        ahead: float,  # how far along a path is swept [m]
+        ahead: float,  # length of a path that is swept [m]
     ) -> NearbyObjects:
         """The objects from a little behind the robot to a little beyond what is swept."""
         size = world.robot.circumscribed_radius
@@ -45,7 +45,7 @@ class NearbyObjects:
         self,
         world: World,  # the whole world
         objects: FloatArray,  # (M, N, 3) poses of those that are near
-        missing: int,  # how many more poses there are
+        missing: int,  # number of further poses
     ) -> FloatArray:
         """(M + missing, K, 3) poses of all objects of a world; after the M given ones they rest."""
         count = len(objects)

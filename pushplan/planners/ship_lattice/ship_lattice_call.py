@@ -124,11 +124,11 @@ class ShipLatticeCall:
         return [*nearer, (1.0, 0.0)]
 
     def stopped(self) -> bool:
-        """Whether the stop rule fires now."""
+        """Return True if the stop rule fires now."""
         return self.call.check(self.iterations, self.cost)
 
     def _search(self, builder: LatticeBuilder, factor: float) -> bool | None:
-        """Whether a path was found; None if stopped before."""
+        """Search the lattice; return True if a path was found, None if stopped before."""
         built = builder.build(factor)
         star, curves = open_search(built, builder)
         result = PAUSED
@@ -161,7 +161,7 @@ class ShipLatticeCall:
         return True
 
     def _free(self, poses: FloatArray) -> bool:
-        """Whether a path keeps clear of walls, and its origin from the bounds but those ahead."""
+        """Return True if a path is clear of walls, and its origin of all bounds but those ahead."""
         world = self.world
         low = world.static.bounds[:2] + self.side
         high = world.static.bounds[2:] - self.side

@@ -34,10 +34,10 @@ class ShipPathImprover:
     start: FloatArray  # (K, 3) poses of the objects now
     robot_mass: float  # [kg]
     weight: float  # w, cost of work
-    problem: ShortcutProblem  # what changed paths have to keep to
-    ahead: float  # how far along a path it is swept [m]
-    stopped: Callable[[], bool]  # whether to return now
-    free: Callable[[FloatArray], bool]  # whether poses (N, 3) keep clear of walls and in bounds
+    problem: ShortcutProblem  # constraints on changed paths
+    ahead: float  # length of a path that is swept [m]
+    stopped: Callable[[], bool]  # True if the call has to return now
+    free: Callable[[FloatArray], bool]  # True if poses (N, 3) are clear of walls and in bounds
     best: SweptCandidate | None = None
 
     def consider(

@@ -15,7 +15,7 @@ from pushplan.world.checks import FloatArray
 
 
 class ShortcutProblem(NamedTuple):
-    """What a changed path has to keep to."""
+    """Constraints on a changed path, and the scale of its changes."""
 
     radius: float  # Least turning radius [m]
     spacing: float  # Greatest distance between two poses [m]

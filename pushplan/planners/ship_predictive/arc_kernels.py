@@ -66,7 +66,7 @@ def arc_ahead(
     pose: FloatArray,  # (3,) where it begins
     curvature: float,  # [1/m]
     step: float,  # distance between poses along the arc [m]
-    count: int,  # how many there are after the first
+    count: int,  # number of them after the first
 ) -> FloatArray:
     """(N, 4) an arc from a pose on, cut off at the goal; (0, 4) where it leaves the channel."""
     low = channel.low

@@ -28,7 +28,7 @@ class BeamNode(Generic[Ice]):
     ice: Ice
     parent: BeamNode[Ice] | None
     done: bool = False
-    """Whether it has reached the goal."""
+    """True once the node has reached the goal."""
 
     def chain(self) -> list[BeamNode[Ice]]:
         """The nodes from the start on."""
@@ -49,7 +49,7 @@ class StatePropagator(Protocol[Ice]):
     """Keeps the ice along a path and says what going on does to it."""
 
     batch: int
-    """How many pieces are predicted between two looks at the stop rule."""
+    """Number of pieces that are predicted between two looks at the stop rule."""
 
     def start(self) -> Ice:
         """The ice now."""

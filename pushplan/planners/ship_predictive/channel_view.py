@@ -28,13 +28,13 @@ _MOST_PLACES = 20_000  # rows times columns of the table of costs to go, about
 
 @dataclass(frozen=True)
 class ChannelView:
-    """What a search needs; all in the frame of the channel, y ahead, the ship's start at x = 0."""
+    """Scene of a search in the frame of the channel, y ahead, the ship's start at x = 0."""
 
     world: World  # the snapshot, in the world frame
     turn: float  # angle by which the frame is turned against the world's [rad]
     start: FloatArray  # (3,) pose of the ship
     away: float  # y of the goal line [m]
-    channel: Channel  # where the ship's origin may be; its goal is the goal line, or one before it
+    channel: Channel  # region of the ship's origin; its goal is the goal line, or one before it
     near: IntArray  # numbers of the floes that may be met
     floes: FloatArray  # (K, 3) their poses
     bodies: IceBodies  # their shapes and the hull's
@@ -56,7 +56,7 @@ class ChannelView:
         )
 
     def inside(self, poses: FloatArray) -> bool:
-        """Whether the ship's origin is in the channel, and in bounds, at all (N, 3) poses."""
+        """Return True if the ship's origin is in the channel and in bounds at all (N, 3) poses."""
         at = poses[:, :2]
         fits = bool((at >= self.channel.low).all() and (at <= self.channel.high).all())
         if not fits or not self.askew:
@@ -68,7 +68,7 @@ class ChannelView:
 
     @property
     def askew(self) -> bool:
-        """Whether no side of the bounds is parallel to the goal line, so that the box is larger."""
+        """True if no side of the bounds is parallel to the goal line, so that the box is larger."""
         return abs(math.sin(2.0 * self.turn)) > 1e-9
 
 

@@ -1,4 +1,4 @@
-"""What the rest of the path may cost, if no floe moved: a table that guides the search, compiled.
+"""Cost of the rest of the path if no floe moved: a table that guides the search, compiled.
 
 The table holds, for the ship's place and heading, the least of travel plus weighted work on a grid,
 by dynamic programming from the goal line backwards. The work of a metre is taken from the floes as
@@ -36,7 +36,7 @@ class IceCostToGo(NamedTuple):
     row: float  # Distance between the rows of the table
     cell: float  # Distance between the rows and the columns of the field
     field_low: float  # y of its first row; its first column is that of the table
-    bow: float  # How far ahead of the ship's origin its bow meets ice
+    bow: float  # Distance ahead of the ship's origin at which its bow meets ice
     mass: float  # Of the ship [kg]
     weight: float  # w, cost of work against travel
     radius: float  # Least turning radius
@@ -50,7 +50,7 @@ class Floes(NamedTuple):
     masses: FloatArray  # (K,) [kg]
     half_beam: float  # Of the ship [m]
     gain: float  # Work per mass ahead of the bow
-    crowding: float  # How much more it is for each typical floe there
+    crowding: float  # Increase of it for each typical floe there
 
 
 @kernel(allocates=True)

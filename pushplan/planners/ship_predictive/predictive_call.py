@@ -60,7 +60,7 @@ class PredictiveCall:
     """Beams of growing width, and the best path of all."""
 
     beam: BeamSearch[Any]
-    widening: bool  # whether to go on with wider beams
+    widening: bool  # True to go on with wider beams
     first: float = math.nan  # when there was a plan, on the clock of `time.perf_counter`
     _best: BeamNode[Any] | None = None
     _objects: FloatArray | None = None

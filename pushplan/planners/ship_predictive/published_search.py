@@ -75,7 +75,7 @@ class PublishedSearch:
 
     @property
     def arrived(self) -> bool:
-        """Whether the cheapest open node lies beyond the line."""
+        """True if the cheapest open node lies beyond the line."""
         state = self._star.state
         return bool(state.counters[SIZE] and reached(self._built.lattice, state.heap[0]))
 

@@ -43,7 +43,7 @@ def tight_turn(view: ChannelView) -> FloatArray | None:
 
 
 def in_table(theta: float) -> bool:
-    """Whether the costs to go hold for a heading [rad], with some to both sides."""
+    """Return True if the costs to go hold for a heading [rad], with some to both sides."""
     return abs(theta - 0.5 * math.pi) <= STEEPEST - 0.1
 
 
