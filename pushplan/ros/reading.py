@@ -1,4 +1,4 @@
-"""What ROS 2 messages say, of `rosbags` or of `rclpy`, in the types of pushplan."""
+"""Conversion of ROS 2 messages, of `rosbags` or of `rclpy`, into the types of pushplan."""
 
 from __future__ import annotations
 
