@@ -10,10 +10,10 @@ from pushplan.world import Plan, Twist, World
 
 
 class CommandStatus(enum.StrEnum):
-    """What a command is for."""
+    """Purpose of a command."""
 
     DRIVING = "driving"
-    """What the policy wants, within the robot's limits."""
+    """Command of the policy, within the robot's limits."""
     WAITING = "waiting"
     """The robot stands until a plan is there."""
     BLOCKED = "blocked"
@@ -30,7 +30,7 @@ class CommandStatus(enum.StrEnum):
 
 @dataclass(frozen=True)
 class Command:
-    """What to send to the motors.
+    """Command to send to the motors.
 
     Args:
         time: for which it was asked, by the clock of the worlds [s].

@@ -16,7 +16,7 @@ from pushplan.world.checked_fields import (
 
 @dataclass(frozen=True)
 class Disturbances(CheckedFields):
-    """How perception and actuators depart from the ideal.
+    """Departures of perception and actuators from the ideal.
 
     Args:
         position_noise: standard deviation of every seen x and y, of robot and objects [m].

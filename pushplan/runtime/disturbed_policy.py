@@ -19,7 +19,7 @@ from pushplan.world.checks import BoolArray, FloatArray, number
 
 
 class DisturbedPolicy:
-    """What a robot does that runs a policy by `Runner`, for the same loop as every policy.
+    """Simulated robot that runs a policy by `Runner`; itself a policy, so that it fits any loop.
 
     Each call of ``act`` is one period of the robot's loop. All chance comes from the generator of
     the episode, and planning takes a fixed time, so that episodes repeat exactly.
@@ -78,7 +78,7 @@ class DisturbedPolicy:
         self.runner = None
 
     def act(self, world: World, observation: Any = None) -> Twist:
-        """What the actuators do in this period."""
+        """Return the velocity that the actuators drive in this period."""
         if self.runner is None:
             assert self._start is not None
             self.runner = self._make()

@@ -120,7 +120,7 @@ def twist_of(world: World, action: object) -> Twist:
 
 
 def drivable(policy: object, hold: float) -> Any:
-    """What a runner drives: a policy that plans beside driving.
+    """Return the policy that a runner drives: one that plans beside driving.
 
     Args:
         policy: a policy, a planner, or the name of one.

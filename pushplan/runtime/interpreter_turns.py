@@ -6,7 +6,7 @@ import gc
 import sys
 import threading
 
-_SWITCH = 5e-4  # how long another thread may keep the interpreter to itself [s]
+_SWITCH = 5e-4  # time for which another thread may keep the interpreter to itself [s]
 _lock = threading.Lock()
 _users = 0
 _before = 0.0

@@ -30,7 +30,7 @@ _CORNER = 0.05  # sine of a turn below which two edges are one
 
 @dataclass(frozen=True)
 class NoiseAllowance:
-    """How a world is changed before a policy plans in it.
+    """Changes to a world, for noise, before a policy plans in it.
 
     Args:
         place: standard deviation of the noise that is left in places [m].

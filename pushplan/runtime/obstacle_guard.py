@@ -31,7 +31,7 @@ _SLOWER = (1.0, 0.75, 0.5, 0.25, 0.1)
 _HELD = 2.0  # for how long each command may be driven before the next one comes [periods]
 _TURNING_STEPS = 25  # in which a turn begins at most
 _FINE = 0.25  # distance between poses of circles, in that of other paths
-_MOVED = 4.0  # how far something fixed may be seen from where it was [clearances]
+_MOVED = 4.0  # distance from its place at which something fixed may be seen [clearances]
 _ANYWHERE = StaticMap.build(bounds=(-1e9, -1e9, 1e9, 1e9))
 
 
@@ -58,7 +58,7 @@ class ObstacleGuard:
         self._known_fixed = _fixed(world)
         self._new: list[FloatArray] = []
         self._stands = False
-        self._side = 0  # where a robot that cannot stop has room: 1 left, -1 right, 0 unknown
+        self._side = 0  # side with room for a robot that cannot stop: 1 left, -1 right, 0 unknown
         self.observe(world)
 
     def observe(self, world: World) -> World:
@@ -119,7 +119,7 @@ class ObstacleGuard:
         return ramp_twist(robot, before, rest.linear, turn, held), reason
 
     def _paths(self, world: World, twist: Twist) -> list[tuple[int, FloatArray]]:
-        """Where a command may lead to: (N, 3) to a stand, or around the circle of either side."""
+        """Return the paths of a command: (N, 3) to a stand, or around the circle of either side."""
         robot = world.robot
         held = _HELD * self._period
         if robot.can_stop:

@@ -156,7 +156,7 @@ class Runner:
         self._newest: World | None = None
         self._inbox: list[World] = []
         self._shift = self._at = 0.0
-        """What the clock of the commands is behind that of the episode, and the latter [s]."""
+        """Lag of the clock of the commands behind that of the episode, and the latter [s]."""
         self._clock_read = False
         self._stepped = self._refused = ""
         self._cancelled = ""
@@ -313,7 +313,7 @@ class Runner:
         return self._executor.close(timeout) if isinstance(self._executor, ThreadExecutor) else True
 
     def command(self, now: float) -> Command:
-        """What to drive now; never plans, never waits.
+        """Return the command to drive now; never plans, never waits.
 
         A clock that steps, or says no time, brings the robot to a stop with a reason. After a step
         back everything begins anew with the first world of the new clock.

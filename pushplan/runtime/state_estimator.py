@@ -111,7 +111,7 @@ class StateEstimator:
         return np.array(poses)
 
     def _driven(self, time: float) -> Twist:
-        """What takes effect at a time [s]; nothing before the first command."""
+        """Return the command in effect at a time [s]; a standstill before the first command."""
         before = bisect_right(self._sent, time, key=lambda sent: sent[0])
         return self._sent[before - 1][1] if before else Twist(0.0, 0.0)
 

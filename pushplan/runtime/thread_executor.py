@@ -42,7 +42,7 @@ class ThreadExecutor:
         self._open: list[ThreadCall[Any]] = []
 
     def expected(self, stop: Stop | None) -> float:
-        """What the slowest of the last calls took, or else the budget [s]."""
+        """Return the longest of the last calls, or else the budget [s]."""
         return self._took.of(self._stop if stop is None else stop | self._stop)
 
     def submit(
@@ -126,7 +126,7 @@ class _Worker:
                 return
 
     def end(self, timeout: float) -> bool:
-        """Whether no thread is left after so long [s]."""
+        """End the thread, and return True if none is left after so long [s]."""
         if self._thread is not None and self._thread.is_alive():
             self.calls.put(None)
             self._thread.join(timeout)
@@ -169,11 +169,11 @@ class ThreadCall(Generic[T]):
         return self._error is None or isinstance(self._error, Exception)
 
     def ready(self, time: float) -> bool:
-        """Whether the call has ended, in whatever way."""
+        """Return True if the call has ended, in whatever way."""
         return self.ended
 
     def result(self) -> T:
-        """What it returned.
+        """Return the result of the call.
 
         Raises:
             PlanningError: if it raised, or did not come to its end.
