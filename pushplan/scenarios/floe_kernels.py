@@ -314,7 +314,7 @@ def place_discs(
 
 @kernel
 def _touches_disc(x: float, y: float, reach: float, i: int, j: int, buckets: _Buckets) -> bool:
-    """Whether a disc of radius ``reach`` in column i and row j overlaps a placed one."""
+    """Return True if a disc of radius ``reach`` in column i and row j overlaps a placed one."""
     head = buckets.head
     centres = buckets.centres
     for row in range(max(0, j - 1), min(head.shape[0], j + 2)):
@@ -332,7 +332,7 @@ def _touches_disc(x: float, y: float, reach: float, i: int, j: int, buckets: _Bu
 
 @kernel
 def _touches_block(x: float, y: float, reach: float, water: IceWater) -> bool:
-    """Whether a disc of radius ``reach`` overlaps a region to stay off."""
+    """Return True if a disc of radius ``reach`` overlaps a region to stay off."""
     offsets = water.block_offsets
     for b in range(offsets.shape[0] - 1):
         gap, _, _ = nearest_point(x, y, water.blocks[offsets[b] : offsets[b + 1]])

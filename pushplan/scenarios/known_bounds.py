@@ -1,4 +1,4 @@
-"""How good a solution of a scenario can be, and how good the best known one is: shipped data."""
+"""Proven bounds and best known costs of scenarios: shipped data."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from pushplan.world import InvalidInputError, SchemaError
 from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat
 
 BOUNDS_FILE = "data/bounds.csv"
-"""Where the package keeps them."""
+"""File of the bounds in the package."""
 _OVERLAPS = 0.01  # of a bound, by which what simulators leave overlapping may undercut it
 _COLUMNS = ("scenario", "robot_mass_kg", "bound_kg_m", "best_kg_m", "best_policy")
 
 
 @dataclass(frozen=True)
 class KnownBounds(CheckedFields):
-    """What is known of m₀ l₀ + Σ mᵢ lᵢ of a successful episode of one scenario.
+    """Bound and best known value of m₀ l₀ + Σ mᵢ lᵢ in a successful episode of one scenario.
 
     Args:
         robot_mass: m₀ [kg].
@@ -54,7 +54,7 @@ class KnownBounds(CheckedFields):
 
 @cache
 def known_bounds() -> Mapping[str, KnownBounds]:
-    """What ships with pushplan, by `Scenario.key`."""
+    """Return the bounds that ship with pushplan, by `Scenario.key`."""
     return MappingProxyType(load_bounds(Path(__file__).parent / BOUNDS_FILE))
 
 

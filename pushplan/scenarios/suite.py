@@ -69,7 +69,7 @@ def _digest(start: Scenario) -> str:
 
 
 def _place(start: Scenario) -> tuple[str, ...]:
-    """Where a scenario comes from: the folders of its world file and the file, or its name."""
+    """Return the origin of a scenario: the folders of its world file and the file, or its name."""
     if start.name:
         return (start.name.split("/")[-1],)
     if _FILE not in start.variations:
