@@ -23,7 +23,7 @@ from pushplan.world.checks import BoolArray, FloatArray, IntArray
 EXHAUSTED = 0
 FOUND = 1
 PAUSED = 2
-"""What `AStar.run` returns: no path exists; the goal was reached; the budget was used up."""
+"""Results of `AStar.run`: no path exists; the goal was reached; the budget was used up."""
 SIZE = 0
 EXPANDED = 1
 GENERATED = 2
@@ -56,7 +56,7 @@ def estimate(lattice: Any, node: int) -> float:
 
 @KernelByType
 def is_goal(lattice: Any, node: int) -> bool:
-    """Whether a node is a goal; by the type of lattice."""
+    """Return True if a node is a goal; by the type of lattice."""
     raise NotImplementedError
 
 
@@ -242,7 +242,7 @@ class AStar:
 
     @property
     def expanded(self) -> int:
-        """How many nodes have been expanded."""
+        """Number of nodes that have been expanded."""
         return int(self.state.counters[EXPANDED])
 
     @property

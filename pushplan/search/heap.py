@@ -11,7 +11,7 @@ from pushplan.world.checks import FloatArray, IntArray
 
 @kernel(inline=True)
 def _before(key_a: float, node_a: int, key_b: float, node_b: int) -> bool:
-    """Whether a key comes first; equal keys go by the number of the node."""
+    """Return True if the first key comes first; equal keys go by the number of the node."""
     return key_a < key_b or (key_a == key_b and node_a < node_b)
 
 
