@@ -1,4 +1,4 @@
-"""Where a server listens: a Unix socket, or a TCP port that only this machine reaches."""
+"""Address of a server: a Unix socket, or a TCP port that only this machine reaches."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _FORMS = "unix:PATH or tcp:127.0.0.1:PORT"
 
 @dataclass(frozen=True)
 class Address:
-    """Where to listen.
+    """Address at which a server listens.
 
     Args:
         path: of a Unix socket; empty for TCP.

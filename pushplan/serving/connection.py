@@ -21,7 +21,7 @@ _SENDS_NO_MORE = getattr(select, "POLLRDHUP", 0)
 
 @dataclass(frozen=True)
 class ServerLimits(CheckedFields):
-    """What clients may take; whoever wants more gets an error message and is sent away.
+    """Limits on clients; whoever wants more gets an error message and is sent away.
 
     Args:
         clients: how many there may be at once. One that has left counts until its planning call has

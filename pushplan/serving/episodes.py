@@ -36,7 +36,7 @@ SETTINGS = (
     "margin",
     "keep_unseen",
 )
-"""What a client may set, as arguments of `Runner`; ``planning_limit`` holds for both kinds."""
+"""Settings of a client, as arguments of `Runner`; ``planning_limit`` holds for both kinds."""
 
 
 class PlanCount:
@@ -48,7 +48,7 @@ class PlanCount:
         self._since = 0.0
 
     def fields(self, plan: Plan | None, time: float, with_plan: bool) -> dict[str, Any]:
-        """What a reply says of the plan that is followed at a time [s]."""
+        """Return the fields of a reply about the plan that is followed at a time [s]."""
         if plan is not self._plan:
             self._plan = plan
             self._since = time
@@ -131,7 +131,7 @@ class LoopEpisode:
         return {"type": "updated", "taken": self._runner.update(world)}
 
     def command(self, now: float, with_plan: bool) -> dict[str, Any]:
-        """What to drive now."""
+        """Return the reply with the command to drive now."""
         return self._fields(self._runner.command(now), with_plan)
 
     def cancel(self, reason: str) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from pushplan.world.checks import FloatArray
 FARTHEST = 1e6
 """Greatest distance of anything from the origin, along x or y [m]."""
 WIDEST = 1e5
-"""How far bounds, robot and goal may be apart along x or y [circumscribed radii of the robot]."""
+"""Greatest extent of bounds, robot and goal along x or y [circumscribed radii of the robot]."""
 FASTEST = 1e6
 """Greatest speed [m/s] and turn rate [rad/s] of anything."""
 HEAVIEST = 1e12

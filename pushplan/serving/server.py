@@ -26,7 +26,7 @@ from pushplan.world import InvalidInputError, Policy
 from pushplan.world.checks import expect
 
 _GRACE_S = 5.0  # for how long planning calls may go on after the end of the server [s]
-_LOOK_S = 0.1  # how often it looks whether clients have left that wait for an answer [s]
+_LOOK_S = 0.1  # interval of the checks that clients who wait for an answer are still there [s]
 _Result = TypeVar("_Result")
 _PAUSE_S = 0.01  # between two looks whether all clients have gone [s]
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -107,12 +107,12 @@ class PolicyServer:
 
     @property
     def address(self) -> str:
-        """Where it listens, as clients take it; with the port that was found for port 0."""
+        """Address at which it listens, as clients take it; with the port found for port 0."""
         return str(self._address)
 
     @property
     def clients(self) -> int:
-        """How many clients there are, with those that have left while a planning call runs."""
+        """Number of clients, with those that have left while a planning call runs."""
         return len(self._present)
 
     def __enter__(self) -> PolicyServer:
