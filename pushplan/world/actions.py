@@ -1,4 +1,4 @@
-"""What a policy may ask of a robot; an array is an action in the environment's own space."""
+"""Commands of a policy to a robot; an array is an action in the environment's own space."""
 
 from __future__ import annotations
 

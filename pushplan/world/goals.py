@@ -1,4 +1,4 @@
-"""Where the robot, or what it pushes, has to end up."""
+"""Goals of the robot, or of what it pushes."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class GoalDisc(ArrayRecord, CheckedFields):
         return max(0.0, gap)
 
     def contains(self, points: FloatArray) -> BoolArray:
-        """Which of the (..., 2) points [m] count as the goal."""
+        """Check which of the (..., 2) points [m] count as the goal."""
         offset = points - self.center
         inside: BoolArray = np.hypot(offset[..., 0], offset[..., 1]) <= self.radius
         return inside
@@ -70,7 +70,7 @@ class GoalLine(ArrayRecord, CheckedFields):
         return max(0.0, float(np.dot(self.point - np.array([x, y]), self.normal)))
 
     def contains(self, points: FloatArray) -> BoolArray:
-        """Which of the (..., 2) points [m] are on the line or beyond."""
+        """Check which of the (..., 2) points [m] are on the line or beyond."""
         beyond: BoolArray = (points - self.point) @ self.normal >= 0.0
         return beyond
 

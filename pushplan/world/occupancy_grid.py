@@ -20,13 +20,13 @@ from pushplan.world.checks import (
 from pushplan.world.outline import transform
 
 UNKNOWN = ("obstacle", "free")
-"""What unknown cells may count as."""
+"""Treatments of unknown cells."""
 MOST_RECTANGLES = 100_000
 """Greatest number: some seconds and 100 MB. Maps of robots need up to some thousands."""
 
 
 def occupied_cells(grid: ArrayLike, occupied: int, unknown: str) -> BoolArray:
-    """Which cells of an occupancy grid are obstacles, (rows, columns).
+    """Find the cells of an occupancy grid that are obstacles, (rows, columns).
 
     Arguments as in `StaticMap.from_occupancy`.
 
@@ -90,7 +90,7 @@ def _placed(origin: FloatArray, points: FloatArray) -> FloatArray:
 
 
 def _triangles(rim: FloatArray, box: FloatArray) -> list[FloatArray]:
-    """What a box (4, 2) holds beyond a rotated rectangle (4, 2) whose corners lie on its sides."""
+    """Cut a rotated rectangle (4, 2) out of the box (4, 2) around it; return the triangles left."""
     found = []
     for a, b in zip(rim, np.roll(rim, -1, axis=0), strict=True):
         outward = np.array([b[1] - a[1], a[0] - b[0]])

@@ -1,4 +1,4 @@
-"""What makes a list of corners a valid outline, and how ragged outlines are flattened."""
+"""Rules for a valid outline of corners, and the flattening of ragged outlines."""
 
 from __future__ import annotations
 
@@ -204,7 +204,7 @@ def convex_outlines(name: str, outlines: Sequence[ArrayLike]) -> list[FloatArray
 
 
 def well_formed(vertices: FloatArray, offsets: IntArray) -> BoolArray:
-    """Which of some flattened outlines are convex, counter-clockwise and have an area.
+    """Check which of some flattened outlines are convex, counter-clockwise and have an area.
 
     The rules of `convex_outline` without its allowance for rounding, for all of them at once.
 

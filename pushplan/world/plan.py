@@ -1,4 +1,4 @@
-"""What a planner returns."""
+"""Result of a planner: status, plan and statistics."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class PlanStatus(enum.Enum):
-    """How a planning call ended; ``remedy`` says what the caller can do about it."""
+    """Outcome of a planning call; ``remedy`` says what the caller can do about it."""
 
     SOLVED = ("solved", "Follow the plan.")
     APPROXIMATE = (
@@ -61,7 +61,7 @@ class PlanStatus(enum.Enum):
 
     @property
     def has_plan(self) -> bool:
-        """Whether a result of this status carries a plan."""
+        """True if a result of this status carries a plan."""
         return self in (PlanStatus.SOLVED, PlanStatus.APPROXIMATE, PlanStatus.PATH_ONLY)
 
 
@@ -156,7 +156,7 @@ class Plan(ArrayRecord, CheckedFields):
 
 @dataclass(frozen=True)
 class PlanStats:
-    """What a planning call did.
+    """Statistics of a planning call.
 
     Args:
         wall_time_s: time inside the call [s].

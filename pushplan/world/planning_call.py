@@ -1,4 +1,4 @@
-"""What all planners do in a call: check what they are given, watch the clock, wrap up a result."""
+"""Planning call: check the arguments, watch the clock, wrap up a result; for all planners."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class PlanningCall:
         self.rng = np.random.default_rng(0) if generator is None else generator
         own = wants_own_budget(given)
         self.has_rule = not own
-        """Whether a rule of the caller takes the place of the planner's own budget."""
+        """True if a rule of the caller takes the place of the planner's own budget."""
         rules = [rule for rule in (given, default if own else None) if rule is not None]
         self._rule = AnyOf(tuple(rules)) if len(rules) > 1 else rules[0] if rules else None
         self.arm()
@@ -53,7 +53,7 @@ class PlanningCall:
 
     @property
     def cancelled(self) -> bool:
-        """Whether a cancellation token in the stop rule has been used."""
+        """True if a cancellation token in the stop rule has been used."""
         return self._rule is not None and self._rule.cancelled
 
     @property

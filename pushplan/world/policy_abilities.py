@@ -1,4 +1,4 @@
-"""What a `Policy` may have beside ``reset`` and ``act``: small contracts, all of them optional.
+"""Abilities of a `Policy` beside ``reset`` and ``act``: small contracts, all of them optional.
 
 Whoever runs a policy asks ``isinstance(policy, LogsPlans)``; a policy has an ability by having the
 attributes, without inheriting anything. ``docs/extending.md`` shows each.
@@ -41,7 +41,7 @@ class PlanningExecutor(Protocol):
         """True if the robot drives on while a call runs."""
 
     def expected(self, stop: Stop | None) -> float:
-        """How long the next call will take by the clock of the world [s]; 0 if unknown.
+        """Return the time that the next call will take by the world's clock [s]; 0 if unknown.
 
         Args:
             stop: its stop rule.

@@ -1,4 +1,4 @@
-"""What a robot is to a planner: a footprint, a mass, and how it may move."""
+"""Robot as a planner sees it: a footprint, a mass, and the ways in which it may move."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from pushplan.world.outline import convex_outline, flatten, grown_outline, inscr
 
 
 class Drive(enum.StrEnum):
-    """How the robot may move."""
+    """Kind of motion that the robot is capable of."""
 
     CONSTANT_SPEED = "constant_speed"
     """Always forward at ``max_speed``; only the turn rate is free (Maze robot, ship)."""
@@ -164,5 +164,5 @@ class RobotModel(ArrayRecord, CheckedFields):
 
     @property
     def can_stop(self) -> bool:
-        """Whether the robot may stand."""
+        """True if the robot may stand."""
         return self.drive is not Drive.CONSTANT_SPEED

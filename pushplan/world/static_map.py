@@ -1,4 +1,4 @@
-"""What never moves: walls, columns, dividers."""
+"""Map of what never moves: walls, columns, dividers."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ class StopCheck(Protocol):
     """A rule that has been armed for one planning call."""
 
     def __call__(self, iterations: int, cost: float) -> bool:
-        """Whether to return now.
+        """Return True if the planner has to return now.
 
         Args:
             iterations: main-loop iterations so far.
@@ -52,7 +52,7 @@ class Stop(ABC):
 
     @property
     def cancelled(self) -> bool:
-        """Whether a cancellation token in the rule has been used."""
+        """True if a cancellation token in the rule has been used."""
         return False
 
 
@@ -144,7 +144,7 @@ class Cancellation(Stop):
 
     @property
     def cancelled(self) -> bool:
-        """Whether `cancel` was called."""
+        """True once `cancel` was called."""
         return self._event.is_set()
 
     def start(self) -> StopCheck:
@@ -167,7 +167,7 @@ class AnyOf(Stop):
 
     @property
     def cancelled(self) -> bool:
-        """Whether any token among the rules was used."""
+        """True if any token among the rules was used."""
         return any(rule.cancelled for rule in self.rules)
 
     def start(self) -> StopCheck:
@@ -182,7 +182,7 @@ def rules_of(stop: Stop) -> tuple[Stop, ...]:
 
 
 def wants_own_budget(stop: Stop | None) -> bool:
-    """Whether a call ends where the planner would without a rule, too."""
+    """Return True if a call ends where the planner would without a rule, too."""
     return stop is None or any(isinstance(rule, OwnBudget) for rule in rules_of(stop))
 
 

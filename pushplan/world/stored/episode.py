@@ -44,7 +44,7 @@ _none = partial(np.zeros, 0)
 
 @dataclass(frozen=True, eq=False)
 class Episode(ArrayRecord, CheckedFields):
-    """What happened from one start to one end, whoever recorded it.
+    """Record of an episode from start to end, whoever recorded it.
 
     Args:
         world: the start.
@@ -118,7 +118,7 @@ class Episode(ArrayRecord, CheckedFields):
         Path(path).write_bytes(self.to_bytes())
 
     def to_bytes(self) -> bytes:
-        """What `save` writes; errors as there."""
+        """Return the bytes that `save` writes; errors as there."""
         header = {
             "schema": SCHEMA,
             "world": world_to_dict(self.world),

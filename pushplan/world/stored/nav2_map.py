@@ -125,7 +125,7 @@ def _picture(path: Path) -> tuple[IntArray, BoolArray]:
 
 
 def _pixels(image: Any) -> tuple[IntArray, BoolArray]:
-    """What `_picture` returns, as GraphicsMagick makes it: in 16 bits, then rounded down to 8."""
+    """Convert an image to `_picture`'s result like GraphicsMagick: in 16 bits, then down to 8."""
     hidden = image.info.get("transparency")
     if image.mode.startswith("I"):  # 16 bits of grey
         deep = np.asarray(image, dtype=np.int64)

@@ -1,4 +1,4 @@
-"""What a policy meant to do, beside what happened: the plans of an episode, thinned out."""
+"""Plans of an episode, thinned out: what a policy meant to do, beside what happened."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ class PlanRecorder:
         return places, predicted[-1][chosen]
 
     def recorded(self) -> RecordedPlans:
-        """What was noted so far."""
+        """Return the plans that were noted so far."""
         none = np.zeros((0, 3))
         start = 0.0, none, np.zeros(0, dtype=np.int64), none  # so that there is one to join
         times, paths, moved, poses = zip(start, *self._kept, strict=True)
