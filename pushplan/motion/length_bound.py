@@ -1,4 +1,4 @@
-"""Lower bound on the cost of every plan."""
+"""Lower bound on the cost of every plan, from shortest paths and the turn limit."""
 
 from __future__ import annotations
 

@@ -203,7 +203,7 @@ class LatticeBuilder:
         return int(np.ceil(self.world.robot.circumscribed_radius / self.cell)) + 2
 
     def _heuristic(self, sums: FloatArray, lattice: PoseLattice) -> tuple[FloatArray, FloatArray]:
-        """Return the bounds and costs to a line for `PoseLattice`; those that it has for a disc."""
+        """Return the bounds on the cost to a line for `PoseLattice`; its own for a disc."""
         if isinstance(self.world.goal, GoalDisc):
             return lattice.row_bounds, lattice.place_costs
         cells = self.cells
