@@ -131,8 +131,8 @@ def _read_json(path: Path) -> tuple[Sequence[Any], object]:
             raise SchemaError(
                 f"{path}: this pushplan reads schema {SCHEMA!r}, got {short(data['schema'])}"
             )
-        data = data["polygons"]
         bounds = data.get("bounds")
+        data = data["polygons"]
     if not isinstance(data, list):
         raise SchemaError(f"{path}: polygons must be a list of lists of corners, got {short(data)}")
     return data, bounds
