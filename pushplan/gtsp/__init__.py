@@ -1,4 +1,4 @@
-"""Which cluster next, and which of its nodes: the generalized travelling salesman problem."""
+"""Generalized travelling salesman problem: the order of clusters, and a node of each."""
 
 from pushplan.gtsp.gtsp_config import GtspConfig
 from pushplan.gtsp.gtsplib import read_gtsp

@@ -60,7 +60,7 @@ def _relax(values: FloatArray, block: FloatArray, size: int, out: FloatArray, wi
 
 
 ARCS_PER_SECOND = 1.5e9
-"""How many arcs the kernel looks at, on a slow machine."""
+"""Number of arcs that the kernel looks at in a second, on a slow machine."""
 
 
 def table_mb(problem: Problem) -> float:

@@ -97,7 +97,7 @@ class TsplibText:
         return int(value)
 
     def section(self, name: str) -> tuple[int, list[tuple[int, list[str]]]]:
-        """Where a section begins, and its lines as words."""
+        """Return the line at which a section begins, and its lines as words."""
         if name not in self.sections:
             raise SchemaError(f"{self.path}: the section {name} is missing")
         return self.sections[name]

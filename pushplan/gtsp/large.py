@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pushplan.world.checks import IntArray
 
 NEAREST = 5
-"""How many of the nearest clusters say how promising a node is."""
+"""Number of nearest clusters by which the promise of a node is judged."""
 
 
 def promising(

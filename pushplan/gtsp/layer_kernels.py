@@ -233,7 +233,7 @@ def close_gap(
 
 @kernel(inline=True)
 def insertion_cost(tour: Layers, c: int, a: int, b: int, limit: float) -> float:
-    """What the tour costs more by with cluster c between a and b.
+    """Return the increase in the tour's cost with cluster c between a and b.
 
     Infinite where a lower bound says that it is not below the limit.
     """

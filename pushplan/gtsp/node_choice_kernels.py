@@ -91,7 +91,7 @@ def best_nodes(
     costs: FloatArray,  # (N, N + SPARE)
     offsets: IntArray,  # (m + 1,)
     order: IntArray,  # (>= count,) clusters in visiting order
-    count: int,  # how many of them, at least 2
+    count: int,  # number of them, at least 2
     nodes: IntArray,  # (>= count,) filled with the chosen nodes
     layers: FloatArray,  # (>= count, K + SPARE) working memory
 ) -> float:

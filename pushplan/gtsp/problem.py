@@ -49,7 +49,7 @@ class Problem:
 
     @property
     def count(self) -> int:
-        """How many clusters there are."""
+        """Number of clusters."""
         return len(self.offsets) - 1
 
     @property
@@ -117,7 +117,7 @@ class Problem:
 
     @cached_property
     def symmetric(self) -> bool:
-        """Whether every arc costs the same both ways."""
+        """True if every arc costs the same in both directions."""
         return bool(np.array_equal(self.costs, self.costs.T))
 
     @cached_property

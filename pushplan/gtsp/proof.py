@@ -32,7 +32,7 @@ FEW_PATHS = 4_000
 
 @dataclass
 class Proof:
-    """What is known of the optimum."""
+    """Proven facts about the optimum."""
 
     bound: float = np.inf  # no tour is cheaper, -inf if nothing is known
     complete: bool = True  # the best tour that is known is proven to be optimal

@@ -139,7 +139,7 @@ def _to_front(order: IntArray, root: int, scratch: IntArray) -> None:
 
 
 class TourProblem(NamedTuple):
-    """What a search works on."""
+    """Input of a ruin-and-recreate search."""
 
     costs: FloatArray  # (N, N + SPARE) finite
     reverse: FloatArray  # (N, N + SPARE) of the transpose
@@ -151,11 +151,11 @@ class TourProblem(NamedTuple):
     max_removed: int  # Clusters that a round removes at most, at most m - 2
     blink: float  # Fraction of places that an insertion overlooks
     reach: int  # Neighbours that a segment swap tries
-    symmetric: bool  # Whether a reversed segment costs the same
+    symmetric: bool  # True if a reversed segment costs the same
 
 
 class TourState(NamedTuple):
-    """What a search has found; all of it is changed."""
+    """State of a search; all of it is changed."""
 
     current: IntArray  # (m,) order, the root (a small cluster) first
     current_nodes: IntArray  # (m,) its nodes

@@ -23,7 +23,7 @@ NARROW_S = 1e-7
 
 @dataclass
 class Budget:
-    """What a call may use, and how much of it is gone."""
+    """Budget of a call, and the part of it that is used."""
 
     check: StopCheck  # the armed stop rule
     began: float  # when the call began, of `time.perf_counter` [s]
@@ -61,7 +61,7 @@ class Budget:
         return max(by_time, self.used / self.rounds if self.rounds > 0.0 else 1.0)
 
     def stopped(self) -> bool:
-        """Whether to return now."""
+        """Return True if the search has to return now."""
         return self.used >= self.rounds or self.check(self.used, self.cost)
 
 
@@ -178,7 +178,7 @@ class AnytimeSearch:
         )
 
     def runs_in(self, fraction: float) -> int:
-        """How many runs a fraction of the budget is good for."""
+        """Return the number of runs for which a fraction of the budget suffices."""
         rounds = self.budget.rounds
         if rounds == np.inf:
             self.run(0.0, 1e-9)  # one piece, for the pace

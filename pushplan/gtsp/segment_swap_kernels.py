@@ -27,7 +27,7 @@ def improve_by_swaps(
     near: IntArray,  # (m, k) clusters by distance
     order: IntArray,  # (m,) closed tour of clusters; changed
     nodes: IntArray,  # (m,) their nodes; changed
-    symmetric: bool,  # whether a reversed segment costs the same
+    symmetric: bool,  # True if a reversed segment costs the same
     tolerance: float,  # least gain that counts
 ) -> float:
     """Swap neighbouring segments, and reverse one where costs are symmetric; returns the gain."""

@@ -1,4 +1,4 @@
-"""What the sequencing solver returns."""
+"""Result of the GTSP solver."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pushplan.errors import InvalidInputError
 
 
 class TourStatus(enum.Enum):
-    """How a call ended; ``remedy`` says what the caller can do about it."""
+    """Outcome of a call; ``remedy`` says what the caller can do about it."""
 
     OPTIMAL = ("optimal", "Follow the tour: no cheaper one exists.")
     FEASIBLE = (
@@ -38,13 +38,13 @@ class TourStatus(enum.Enum):
 
     @property
     def has_tour(self) -> bool:
-        """Whether a result of this status carries a tour."""
+        """True if a result of this status carries a tour."""
         return self in (TourStatus.OPTIMAL, TourStatus.FEASIBLE)
 
 
 @dataclass(frozen=True)
 class TourStats:
-    """What a call did.
+    """Statistics of a call.
 
     Args:
         wall_time_s: time inside the call [s].
@@ -90,7 +90,7 @@ class Tour:
 
     @property
     def gap(self) -> float:
-        """How far the tour may be from the optimum, as a fraction of its cost; inf if unknown."""
+        """Greatest possible gap to the optimum, as a fraction of the cost; inf if unknown."""
         if not self.nodes or self.lower_bound == -math.inf:
             return math.inf
         short = self.cost - self.lower_bound

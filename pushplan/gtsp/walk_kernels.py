@@ -90,7 +90,7 @@ def read_visits(
 
 
 class PathProblem(NamedTuple):
-    """What bounds the paths of one length."""
+    """Input of the bounds on paths of one length."""
 
     within: FloatArray  # (n, 2^b, K) walks to the root from the new node, by `Walks.allow_memories`
     costs: FloatArray  # (n, K, n, K) from a node (first two) to a node
@@ -118,7 +118,7 @@ def extend_paths(
     high: int,
     slots: IntArray,  # hash table, a power of two in size, -1 where empty
     longer: Paths,  # filled, one for a set and an end
-    found: int,  # how many there are
+    found: int,  # number of them
 ) -> int:
     """One more node for the paths ``low`` to ``high - 1``; how many there are then, -1 if many."""
     within, costs, lists, prices, sizes, limit = problem
