@@ -23,7 +23,7 @@ from pushplan.world.outline import centroid, flatten
 @kernel(allocates=True)
 def cast_rays(
     out: FloatArray,  # (N,) lengths [m], ray i at heading + 2 pi i / N; shortened
-    x: float,  # where they start [m]
+    x: float,  # their start [m]
     y: float,  # [m]
     heading: float,  # of the first [rad]
     vertices: FloatArray,  # (V, 2) corners of closed outlines, world frame [m]
@@ -63,7 +63,7 @@ _GUIDE, _EACH = 10, 9
 
 @dataclass(frozen=True)
 class FeatureObservation(LimitedVector, CheckedFields):
-    """What matters for pushing, in the robot's frame, cheap to compute and to learn from.
+    """Features for pushing, in the robot's frame, cheap to compute and to learn from.
 
     Our own variant beside the images of the Bench-Push paper. All lengths are divided by
     ``range``. In this order:

@@ -17,7 +17,7 @@ from pushplan.world import InvalidInputError, World
 from pushplan.world.checks import FloatArray, IntArray
 
 _STILL, _STILL_TURN = 0.005, 0.02
-"""What moves less than this has hardly moved [sides of a map of pixels or heading steps, rad]."""
+"""Motion below which nothing has really moved [sides of a map of pixels or heading steps, rad]."""
 _REMEMBERED = 1000
 
 Function = Callable[[NDArray[Any]], NDArray[Any]]
@@ -51,7 +51,7 @@ class NetworkPolicy:
 
     @property
     def observation(self) -> ObservationBuilder:
-        """What an environment has to observe for it."""
+        """Builder of the observations that the policy needs."""
         return self.specification.observation
 
     @property
@@ -142,7 +142,7 @@ class NetworkPolicy:
 
 
 class _Decision(NamedTuple):
-    """Where things were when a pixel or a direction was chosen, and which."""
+    """Choice of a pixel or a direction, and where things were at that time."""
 
     ids: IntArray
     robot: FloatArray
@@ -150,7 +150,7 @@ class _Decision(NamedTuple):
     choice: Any  # (row, column), or an angle [rad]
 
     def was_made_at(self, world: World, still: float) -> bool:
-        """Whether robot and centres of the objects, still the same ones, are within ``still``."""
+        """Return True if robot and objects, still the same ones, have moved less than ``still``."""
         if not np.array_equal(self.ids, world.movables.ids):
             return False
         dx, dy, turn = (world.robot_pose - self.robot).tolist()

@@ -62,7 +62,7 @@ class ObjectPolicy:
             reset()
 
     def act(self, world: World, observation: Any) -> Action:
-        """What the object predicts."""
+        """Return the action that the object predicts."""
         options: dict[str, Any] = {"deterministic": True} if self._deterministic else {}
         if self._takes_state:
             options["state"] = self._state
@@ -86,7 +86,7 @@ def _takes(function: Callable[..., Any], name: str) -> bool:
 
 
 def _needs_nothing(function: Callable[..., Any]) -> bool:
-    """Whether it may be called without arguments."""
+    """Return True if a function can be called without arguments."""
     import inspect
 
     try:

@@ -1,4 +1,4 @@
-"""How the output of a network becomes an action."""
+"""Conversion of network outputs into actions."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ OUTPUTS = ("continuous", "direction", "pixel_values", "chunk")
 CHOOSING = ("direction", "pixel_values")
 """Outputs that `ActionSpec.choose` makes a choice of."""
 NEIGHBOURS = 1.0 / 32.0
-"""How far around a tried pixel `ActionSpec.choose` leaves pixels out, in sides of the map."""
+"""Radius around a tried pixel that `ActionSpec.choose` leaves out, in sides of the map."""
 APART = 0.3
-"""How far `ActionSpec.choose` keeps from a tried direction [rad]."""
+"""Angle that `ActionSpec.choose` keeps from a tried direction [rad]."""
 
 
 class BadOutputError(InvalidInputError):
@@ -32,7 +32,7 @@ class BadOutputError(InvalidInputError):
 
 @dataclass(frozen=True)
 class ActionSpec(CheckedFields):
-    """What a network puts out, and what it means.
+    """Format of a network's output, and its meaning.
 
     Args:
         mode: the action mode of the environment.

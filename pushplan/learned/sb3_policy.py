@@ -76,7 +76,7 @@ class Sb3Policy(NetworkPolicy):
 
 
 def trusted() -> bool:
-    """Whether the environment variable says that pickles may be loaded."""
+    """Return True if the environment variable says that pickles may be loaded."""
     return os.environ.get(TRUST_VARIABLE, "") == "1"
 
 
@@ -113,5 +113,5 @@ def _look(path: Path) -> tuple[Specification, str]:
 
 
 def beside(path: Path) -> Path:
-    """Where the specification of a zip lies that has none inside."""
+    """Return the path of the specification of a zip that has none inside."""
     return path.with_suffix(f".{MEMBER}")

@@ -49,7 +49,7 @@ class RobotSpec(CheckedFields):
         )
 
     def difference(self, robot: RobotModel) -> str | None:
-        """What tells a robot from this one, in words; None if nothing does."""
+        """Describe how a robot differs from this one; None if it does not."""
         other = RobotSpec.of(robot)
         for name, mine in asdict(self).items():
             theirs = getattr(other, name)
@@ -165,7 +165,7 @@ class Specification(CheckedFields):
 
 
 def close(a: float, b: float) -> bool:
-    """Whether two lengths, speeds or times mean the same."""
+    """Return True if two lengths, speeds or times are equal within the tolerance."""
     return math.isclose(a, b, rel_tol=_TOLERANCE)
 
 
