@@ -36,7 +36,7 @@ AROUND = 5
 class PredictionScores:
     """Errors of one predictor over some passages."""
 
-    passages: int  # how many
+    passages: int  # number of passages
     patch_mse: float  # mean squared error of the covered fraction over the whole patch
     swath_mse: float  # over the cells within half a hull length of the swath
     work_bias: float  # mean predicted over mean true work; NaN where no work was done

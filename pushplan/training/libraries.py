@@ -41,7 +41,7 @@ def hardware(device: str) -> str:
 
 
 def parameter_count(network: Any) -> int:
-    """How many numbers a PyTorch module has learned."""
+    """Count the learned parameters of a PyTorch module."""
     return sum(p.numel() for p in network.parameters())
 
 

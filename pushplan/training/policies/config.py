@@ -33,7 +33,7 @@ _OUTPUT_OF = {"pixel_values": "sam", "chunk": "flow"}
 
 @dataclass(frozen=True)
 class ActionChoice(CheckedFields):
-    """How the network acts."""
+    """Action mode, output and horizon of the network."""
 
     field_prefix = "action."
 
@@ -45,7 +45,7 @@ class ActionChoice(CheckedFields):
 
 @dataclass(frozen=True)
 class TrainingConfig(CheckedFields):
-    """What is trained on what. The same configuration, seed and machine give the same policy."""
+    """Settings of a training. The same configuration, seed and machine give the same policy."""
 
     algorithm: Annotated[
         str, OneOf(ALGORITHMS)
@@ -55,7 +55,7 @@ class TrainingConfig(CheckedFields):
     scenarios: tuple[Mapping[str, Any], ...]
     # of the network, as in a specification (``kind`` and its options)
     observation: Mapping[str, Any]
-    action: ActionChoice  # how it acts
+    action: ActionChoice  # action mode and output of the network
     options: Options  # of the algorithm
     simulator: str = "pymunk"  # name of the simulator
     preset: str | None = None  # of the task; the first for the simulator by default

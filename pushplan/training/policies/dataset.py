@@ -180,7 +180,7 @@ def _run(
 
 
 def read_metadata(folder: str | Path) -> dict[str, Any]:
-    """What a data set says about itself.
+    """Read the metadata of a data set.
 
     Raises:
         SchemaError: if the folder holds no data set.

@@ -1,4 +1,4 @@
-"""What a data set shows a network: observations, and the outputs wanted for them."""
+"""Demonstrations for a network: observations, and the outputs wanted for them."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def check_dataset(config: TrainingConfig, data: str | Path) -> None:
 def demonstrations(
     config: TrainingConfig, data: Sequence[str | Path], held_out: float
 ) -> tuple[Demonstrations, Demonstrations]:
-    """What to learn from and what to measure on; split by episode.
+    """Return demonstrations to learn from and demonstrations to measure on; split by episode.
 
     Raises:
         InvalidInputError: if a data set does not fit, or there are too few episodes.

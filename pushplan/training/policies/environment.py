@@ -22,7 +22,7 @@ TRAINING_SEEDS = 2**20
 """Layouts of training have seeds from here on; those below are for validation and scoring."""
 VALIDATION_SEEDS = 500_000
 PATIENCE = 4
-"""How much longer a validation episode may last than one of training."""
+"""Factor by which a validation episode may last longer than one of training."""
 _SEED_COUNT = 2**30
 
 
@@ -87,7 +87,7 @@ class TrainingEnv(gymnasium.Env[NDArray[Any], Any]):
 
     @property
     def specification(self) -> Specification:
-        """What a network says about itself that has learned here."""
+        """Specification of a network that has learned here."""
         facts = {"algorithm": self.config.algorithm}
         return specification_of(self._env.task, self._builder, self.action, facts)
 
@@ -144,7 +144,7 @@ class TrainingEnv(gymnasium.Env[NDArray[Any], Any]):
         return self.observe(), self.config.reward_scale * total, terminated, truncated, told
 
     def observe(self) -> NDArray[Any]:
-        """What the network sees now."""
+        """Return the network's observation of the present world."""
         return self._builder.observe(self._env.world)
 
     def close(self) -> None:
@@ -154,7 +154,7 @@ class TrainingEnv(gymnasium.Env[NDArray[Any], Any]):
 
 
 def action_spec(config: TrainingConfig, env: PushEnv) -> ActionSpec:
-    """What the output of the network means in an environment."""
+    """Return the meaning of the network's output in an environment."""
     output, mode = config.action.output, config.action.mode
     shapes = {"direction": (2,), "chunk": (config.action.horizon, MODES[mode])}
     shape: tuple[int, ...] = shapes.get(output, (MODES[mode],))

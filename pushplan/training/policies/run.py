@@ -52,7 +52,7 @@ class CurvePoint:
 
     @property
     def rank(self) -> tuple[float, float]:
-        """What makes one policy better than another in validation."""
+        """Rank of a policy in validation; the greater is better."""
         if math.isnan(self.valid_share):  # without validation the last one is taken
             return (0.0, 0.0)
         return (round(self.valid_share, 6), self.valid_return)
@@ -98,12 +98,12 @@ class TrainingRun:
 
     @property
     def chunks(self) -> int:
-        """How many chunks the training has."""
+        """Number of chunks of the training."""
         return -(-self.config.steps // self.config.chunk)
 
     @property
     def done(self) -> int:
-        """How many of them are done."""
+        """Number of chunks that are done."""
         return len(self.curve)
 
     @property
@@ -169,12 +169,12 @@ class TrainingRun:
 
 
 class Learned(NamedTuple):
-    """What came of the training in one chunk."""
+    """Result of training in one chunk."""
 
     steps: int  # decisions or pairs so far
     loss: float
     returns: Sequence[float] = ()  # scaled rewards of the episodes that ended in the chunk
-    successes: Sequence[float] = ()  # whether these episodes reached the goal
+    successes: Sequence[float] = ()  # True for those of these episodes that reached the goal
 
 
 class Learner(Protocol):

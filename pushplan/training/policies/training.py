@@ -128,7 +128,7 @@ def _saved_actor(run: TrainingRun, model: Any, env: TrainingEnv) -> Any:
 
 
 def _specification(env: TrainingEnv, **facts: Any) -> Specification:
-    """What the network of a training says about itself."""
+    """Return the specification of the network of a training."""
     config, specification = env.config, env.specification
     training = {
         **specification.training,
