@@ -60,7 +60,7 @@ def shown_texts(figure: Any, renderer: Any) -> list[tuple[str, Any]]:
     return [(text, box) for text, box in boxes if box.width > 0.0]
 
 
-@pytest.mark.parametrize("width", [None, 3.3, 7.0])
+@pytest.mark.parametrize("width", [None, 3.3, pytest.param(7.0, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", FIGURES)
 @pytest.mark.parametrize(
     ("policies", "settings", "long"),

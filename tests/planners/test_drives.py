@@ -215,8 +215,14 @@ def test_turns_on_the_spot_and_reverse_arcs_are_driven_to_the_goal(kind, pose, c
 
 
 @pytest.mark.warm("push-aware")
-@pytest.mark.parametrize("controller", [PathFollower, PurePursuit, MpcTracker])
-@pytest.mark.parametrize("kind", ["car", "car that reverses", "disc", "several parts"])
+@pytest.mark.parametrize(
+    ("kind", "controller"),
+    [
+        pytest.param(kind, one, marks=() if (n + k) % 2 == 0 else pytest.mark.slow)
+        for n, kind in enumerate(["car", "car that reverses", "disc", "several parts"])
+        for k, one in enumerate([PathFollower, PurePursuit, MpcTracker])
+    ],
+)
 def test_controllers_bring_every_kind_of_robot_to_its_goal(kind, controller):
     robot = ROBOTS[kind]
     planner = make_planner("push-aware")
