@@ -44,11 +44,8 @@ def checked_costs(costs: ArrayLike) -> NDArray[np.number]:
             f"costs must be above -inf, got -inf from node {u} to node {v}; +inf forbids an arc"
         )
     if high == np.inf:
-        high = max((row[row < np.inf].max(initial=low) for row in matrix), default=low)
-        high = low if high == np.inf else high
-    largest = max(abs(float(low)), abs(float(high)))
-    if largest == np.inf:
-        largest = 0.0
+        high = matrix.max(where=matrix < np.inf, initial=low)
+    largest = max(abs(float(low)), abs(float(high))) if low < np.inf else 0.0
     if matrix.dtype.kind in "iu" and largest * len(matrix) >= LARGEST_WHOLE:
         raise InvalidInputError(
             f"whole-number costs must add up to less than 2^53 on a tour, got {largest:g}"
@@ -89,28 +86,23 @@ def checked_clusters(
             raise InvalidInputError(
                 f"cluster {index} must hold whole numbers, got an array of {members.dtype}"
             )
-        outside = members[(members < 0) | (members >= nodes)]
-        if outside.size:
-            raise InvalidInputError(
-                f"cluster {index} has node {outside[0]}, but nodes are 0 to {nodes - 1}"
-            )
-        members = members.astype(np.int64)
-        for node in members:
-            if owner[node] >= 0:
-                where = (
-                    f"clusters {owner[node]} and {index}"
-                    if owner[node] != index
-                    else (f"cluster {index} twice")
+        for node in members.tolist():
+            if not 0 <= node < nodes:
+                raise InvalidInputError(
+                    f"cluster {index} has node {node}, but nodes are 0 to {nodes - 1}"
                 )
+            if owner[node] >= 0:
+                both = f"clusters {owner[node]} and {index}"
+                where = f"cluster {index} twice" if owner[node] == index else both
                 raise InvalidInputError(f"clusters must not overlap: node {node} is in {where}")
             owner[node] = index
-        found.append(members)
+        found.append(members.astype(np.int64))
     missing = np.flatnonzero(owner < 0)
     if missing.size:
-        shown = ", ".join(str(node) for node in missing[:8])
+        more = ", ..." if missing.size > 8 else ""
         raise InvalidInputError(
-            f"every node must be in a cluster, but {missing.size} are in none: {shown}"
-            f"{', ...' if missing.size > 8 else ''}"
+            f"every node must be in a cluster, but {missing.size} are in none: "
+            f"{', '.join(map(str, missing[:8]))}{more}"
         )
     return tuple(found)
 

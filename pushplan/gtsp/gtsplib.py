@@ -9,6 +9,7 @@ that it breaks.
 from __future__ import annotations
 
 import difflib
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -58,6 +59,10 @@ _KEYWORDS = (
 )
 
 
+Rows = list[tuple[int, list[str]]]
+"""Lines as words, each with its number."""
+
+
 @dataclass
 class TsplibText:
     """The keywords and sections of a file, each with the line it stands in."""
@@ -65,42 +70,46 @@ class TsplibText:
     path: Path  # of the file
     # value and line number of each keyword
     keywords: dict[str, tuple[str, int]] = field(default_factory=dict)
-    # the line number of its heading and the (line number, words) below it
-    sections: dict[str, tuple[int, list[tuple[int, list[str]]]]] = field(default_factory=dict)
+    # the line number of its heading and what is below it
+    sections: dict[str, tuple[int, Rows]] = field(default_factory=dict)
 
     def wrong(self, line: int, rule: str) -> SchemaError:
         """An error at a line."""
         return SchemaError(f"{self.path}, line {line}: {rule}")
 
-    def value(self, key: str, default: str | None = None) -> str:
-        """The value of a keyword."""
-        if key in self.keywords:
-            return self.keywords[key][0]
-        if default is None:
+    def value(self, key: str) -> tuple[str, int]:
+        """The value of a keyword, and its line."""
+        if key not in self.keywords:
             raise SchemaError(f"{self.path}: the keyword {key} is missing")
-        return default
+        return self.keywords[key]
 
     def choice(self, key: str, valid: tuple[str, ...]) -> str:
         """The value of a keyword, which must be one of these."""
-        value = self.value(key).partition("(")[0].strip().upper()  # an author may follow
+        value, line = self.value(key)
+        value = value.partition("(")[0].strip().upper()  # an author may follow
         if value not in valid:
-            raise self.wrong(self.keywords[key][1], unknown_name_message(key, value, valid))
+            raise self.wrong(line, unknown_name_message(key, value, valid))
         return value
 
     def count(self, key: str, high: int) -> int:
         """The value of a keyword that counts something."""
-        value = self.value(key)
-        short = value.isdecimal() and len(value) <= 18
-        if not short or not 1 <= int(value) <= high:
-            rule = f"{key} must be a whole number from 1 to {high}, got {value!r:.40}"
-            raise self.wrong(self.keywords[key][1], rule)
-        return int(value)
+        value, line = self.value(key)
+        if value.isdecimal() and len(value) <= 18 and 1 <= int(value) <= high:
+            return int(value)
+        rule = f"{key} must be a whole number from 1 to {high}, got {value!r:.40}"
+        raise self.wrong(line, rule)
 
-    def section(self, name: str) -> tuple[int, list[tuple[int, list[str]]]]:
+    def section(self, name: str) -> tuple[int, Rows]:
         """Return the line at which a section begins, and its lines as words."""
         if name not in self.sections:
             raise SchemaError(f"{self.path}: the section {name} is missing")
         return self.sections[name]
+
+    def whole_numbers(self, name: str) -> Iterator[tuple[int, int]]:
+        """The line and the value of each word of a section."""
+        for line, words in self.section(name)[1]:
+            for word in words:
+                yield line, self.whole(line, word)
 
     def number(self, line: int, word: str) -> float:
         """A word as a number; NaN is none."""
@@ -129,7 +138,7 @@ def read_text(path: str | Path) -> TsplibText:
     text = TsplibText(Path(path))
     data = safe_files.read_bytes(path, "instance", safe_files.MAX_TEXT)
     lines = data.decode("utf-8-sig", "replace").splitlines()  # names may be in any code
-    rows: list[tuple[int, list[str]]] | None = None
+    rows: Rows | None = None
     for number, line in enumerate(lines, start=1):
         words = line.split()
         if not words or words[0].startswith("#"):
@@ -137,14 +146,12 @@ def read_text(path: str | Path) -> TsplibText:
         head = words[0].partition(":")[0].upper() or ":"
         if head == "EOF":
             break
+        if head in text.sections or (head in text.keywords and head != "COMMENT"):
+            raise text.wrong(number, f"{head} stands here a second time")
         if head in _SECTIONS:
-            if head in text.sections:
-                raise text.wrong(number, f"{head} stands here a second time")
             rows = []
             text.sections[head] = (number, rows)
         elif head in _KEYWORDS:
-            if head in text.keywords and head != "COMMENT":
-                raise text.wrong(number, f"{head} stands here a second time")
             rest = line.strip()[len(head) :].strip()
             text.keywords[head] = (rest.removeprefix(":").strip(), number)
             rows = None
@@ -154,28 +161,27 @@ def read_text(path: str | Path) -> TsplibText:
                 rule = unknown_name_message("keyword", head, _KEYWORDS + _SECTIONS)
                 raise text.wrong(number, rule)
             rows = None  # it says nothing about the problem
-        elif rows is None and {"N", "M"} <= text.keywords.keys():
+        elif rows is not None:
+            rows.append((number, words))
+        elif {"N", "M"} <= text.keywords.keys():
             rows = [(number, words)]
             text.sections["N"] = (number, rows)
-        elif rows is None:
-            raise text.wrong(number, f"data outside of a section: {line.strip()[:40]!r}")
         else:
-            rows.append((number, words))
+            raise text.wrong(number, f"data outside of a section: {line.strip()[:40]!r}")
     return text
 
 
 def _unfold(text: TsplibText) -> None:
     """Turn the short form of GLNS, a line for each set and then the matrix, into that of TSPLIB."""
     begin, rows = text.section("N")
-    line = text.keywords["N"][1]
-    for name, value in (
-        ("TYPE", "AGTSP"),
-        ("DIMENSION", text.value("N")),
-        ("GTSP_SETS", text.value("M")),
-        ("EDGE_WEIGHT_TYPE", "EXPLICIT"),
-        ("EDGE_WEIGHT_FORMAT", "FULL_MATRIX"),
-    ):
-        text.keywords[name] = value, line
+    size, line = text.value("N")
+    text.keywords |= {
+        "TYPE": ("AGTSP", line),
+        "DIMENSION": (size, line),
+        "GTSP_SETS": text.value("M"),
+        "EDGE_WEIGHT_TYPE": ("EXPLICIT", line),
+        "EDGE_WEIGHT_FORMAT": ("FULL_MATRIX", line),
+    }
     count = text.count("M", LARGEST_DIMENSION)
     sets = [(number, [*words, "-1"]) for number, words in rows[:count]]
     text.sections["GTSP_SET_SECTION"] = begin, sets
@@ -200,7 +206,8 @@ def read_gtsp(path: str | Path) -> GtspInstance:
     size = text.count("DIMENSION", LARGEST_DIMENSION)
     kind = text.choice("EDGE_WEIGHT_TYPE", ("EXPLICIT", *COORDINATE_TYPES))
     clusters = _clusters(text, size)
-    name, comment = text.value("NAME", text.path.stem), text.value("COMMENT", "")
+    name, _ = text.keywords.get("NAME", (text.path.stem, 0))
+    comment, _ = text.keywords.get("COMMENT", ("", 0))
     try:
         if kind == "EXPLICIT":
             return GtspInstance(name, _matrix(text, size), clusters, comment=comment)
@@ -214,43 +221,39 @@ def read_gtsp(path: str | Path) -> GtspInstance:
 def _clusters(text: TsplibText, size: int) -> tuple[tuple[int, ...], ...]:
     """Node lists, each a line or more: its number, its nodes, -1."""
     count = text.count("GTSP_SETS", size)
-    begin, rows = text.section("GTSP_SET_SECTION")
+    line, _ = text.section("GTSP_SET_SECTION")
     found: dict[int, list[int]] = {}  # sets are numbered: their order carries nothing
-    current: list[int] | None = None
     owner: dict[int, int] = {}
-    line, name = begin, 0
-    for line, words in rows:
-        for word in words:
-            value = text.whole(line, word)
-            if current is None:
-                if value == -1 and len(found) == count:  # some writers close the section so
-                    continue
-                if not 1 <= value <= count:
-                    raise text.wrong(line, f"sets are 1 to {count} (GTSP_SETS), got {value}")
-                if value in found:
-                    raise text.wrong(line, f"set {value} stands here a second time")
-                name = value
-                current = []
-            elif value == -1:
-                if not current:
-                    raise text.wrong(line, f"set {name} has no node")
-                found[name] = current
-                current = None
-            elif not 1 <= value <= size:
-                raise text.wrong(line, f"nodes are 1 to {size}, got {value}")
-            elif value in owner:
-                rule = f"node {value} is in set {owner[value]} already: sets must not overlap"
-                raise text.wrong(line, rule)
-            else:
-                owner[value] = name
-                current.append(value - 1)
-    if current is not None:
-        raise text.wrong(line, f"set {name} does not end with -1")
+    current = 0  # number of the set that is being read, 0 between sets
+    for line, value in text.whole_numbers("GTSP_SET_SECTION"):
+        if not current:
+            if value == -1 and len(found) == count:  # some writers close the section so
+                continue
+            if not 1 <= value <= count:
+                raise text.wrong(line, f"sets are 1 to {count} (GTSP_SETS), got {value}")
+            if value in found:
+                raise text.wrong(line, f"set {value} stands here a second time")
+            current = value
+            found[current] = []
+        elif value == -1:
+            if not found[current]:
+                raise text.wrong(line, f"set {current} has no node")
+            current = 0
+        elif not 1 <= value <= size:
+            raise text.wrong(line, f"nodes are 1 to {size}, got {value}")
+        elif value in owner:
+            rule = f"node {value} is in set {owner[value]} already: sets must not overlap"
+            raise text.wrong(line, rule)
+        else:
+            owner[value] = current
+            found[current].append(value - 1)
+    if current:
+        raise text.wrong(line, f"set {current} does not end with -1")
     if len(found) != count:
         raise text.wrong(line, f"expected {count} sets, got {len(found)}")
-    missing = [node for node in range(1, size + 1) if node not in owner]
-    if missing:
-        raise text.wrong(line, f"every node must be in a set, but node {missing[0]} is in none")
+    missing = next((node for node in range(1, size + 1) if node not in owner), None)
+    if missing is not None:
+        raise text.wrong(line, f"every node must be in a set, but node {missing} is in none")
     return tuple(tuple(found[number]) for number in sorted(found))
 
 
@@ -265,7 +268,7 @@ def _points(text: TsplibText, size: int) -> FloatArray:
             raise text.wrong(line, f"nodes are 1 to {size}, got {node}")
         if not np.isnan(points[node - 1, 0]):
             raise text.wrong(line, f"node {node} has coordinates already")
-        points[node - 1] = text.number(line, words[1]), text.number(line, words[2])
+        points[node - 1] = [text.number(line, word) for word in words[1:]]
     if len(rows) != size:
         raise text.wrong(begin, f"expected coordinates of {size} nodes, got {len(rows)}")
     return points
@@ -274,20 +277,18 @@ def _points(text: TsplibText, size: int) -> FloatArray:
 def _matrix(text: TsplibText, size: int) -> FloatArray:
     layout = text.choice("EDGE_WEIGHT_FORMAT", FORMATS)
     begin, rows = text.section("EDGE_WEIGHT_SECTION")
-    full, diagonal = layout == "FULL_MATRIX", "DIAG" in layout
-    wanted = size * size if full else size * (size + (1 if diagonal else -1)) // 2
+    full, shift = layout == "FULL_MATRIX", 0 if "DIAG" in layout else 1
+    wanted = size * size if full else size * (size + 1 - 2 * shift) // 2
     values = [text.number(line, word) for line, words in rows for word in words]
     if len(values) != wanted:
         rule = f"{layout} of {size} nodes has {wanted} numbers, got {len(values)}"
         raise text.wrong(begin, rule)
-    data = np.array(values, dtype=np.float64)
     if full:
-        return data.reshape(size, size)
+        return np.array(values).reshape(size, size)
     # columns of one triangle are the rows of the other
     upper = layout.startswith("UPPER") == layout.endswith("ROW")
-    shift = 0 if diagonal else 1
-    result = np.zeros((size, size))
     place = np.triu_indices(size, shift) if upper else np.tril_indices(size, -shift)
-    result[place] = data
-    result[place[1], place[0]] = data
+    result = np.zeros((size, size))
+    result[place] = values
+    result[place[::-1]] = values
     return result

@@ -85,22 +85,20 @@ def read_tour(path: str | Path) -> tuple[int, ...]:
     """
     text = read_text(path)
     text.choice("TYPE", ("TOUR",))
-    begin, rows = text.section("TOUR_SECTION")
+    begin, _ = text.section("TOUR_SECTION")
     nodes: dict[int, None] = {}
     ended = False
-    for line, words in rows:
-        for word in words:
-            value = text.whole(line, word)
-            if ended:
-                raise text.wrong(line, f"expected nothing after -1, got {value}")
-            if value == -1:
-                ended = True
-            elif value < 1:
-                raise text.wrong(line, f"nodes are numbered from 1, got {value}")
-            elif value - 1 in nodes:
-                raise text.wrong(line, f"node {value} is visited twice")
-            else:
-                nodes[value - 1] = None
+    for line, value in text.whole_numbers("TOUR_SECTION"):
+        if ended:
+            raise text.wrong(line, f"expected nothing after -1, got {value}")
+        if value == -1:
+            ended = True
+        elif value < 1:
+            raise text.wrong(line, f"nodes are numbered from 1, got {value}")
+        elif value - 1 in nodes:
+            raise text.wrong(line, f"node {value} is visited twice")
+        else:
+            nodes[value - 1] = None
     if not nodes:
         raise text.wrong(begin, "the tour has no node")
     if "DIMENSION" in text.keywords:
