@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pushplan.learned.outputs import CHOOSING, BadOutputError
-from pushplan.learned.specification import Specification
+from pushplan.learned.specification import Specification, close
 from pushplan.observation import ObservationBuilder
 from pushplan.world import InvalidInputError, World
 from pushplan.world.checks import FloatArray, IntArray
@@ -75,10 +75,35 @@ class NetworkPolicy:
     def check_environment(self, env: Any, scenario: Any = None) -> None:
         """Refuse an environment that it was not made for.
 
+        Only what the environment tells about itself is compared: ``task.name``,
+        ``task.control_step``, ``task.waypoint_window``, ``task.heading_step`` and
+        ``observation_space``; and ``preset`` of the scenario.
+
         Raises:
-            InvalidInputError: naming both sides.
+            InvalidInputError: naming what the file says and what the environment has.
         """
-        self.specification.check_environment(env, self.label, scenario)
+        task, spec = getattr(env, "task", None), self.specification
+        for kind, names, name in (
+            ("task", spec.tasks, getattr(task, "name", None)),
+            ("preset", spec.presets, getattr(scenario, "preset", None)),
+        ):
+            if names and isinstance(name, str) and name not in names:
+                raise self._mismatch(kind, ", ".join(names), name)
+        for kind, length, has in (
+            ("control_step [s]", spec.control_step, getattr(task, "control_step", None)),
+            ("waypoint_window [m]", spec.action.window, getattr(task, "waypoint_window", None)),
+            ("heading_step [m]", spec.action.step, getattr(task, "heading_step", None)),
+        ):
+            if length and has is not None and not close(length, has):
+                raise self._mismatch(kind, f"{length:g}", f"{has:g}")
+        space = getattr(env, "observation_space", None)
+        if space is not None and space.shape != self.observation.shape:
+            raise self._mismatch("observation shape", self.observation.shape, space.shape)
+
+    def _mismatch(self, kind: str, mine: object, theirs: object) -> InvalidInputError:
+        return InvalidInputError(
+            f"policy {self.label!r} was made for {kind} {mine}, the environment has {theirs}"
+        )
 
     def reset(self, world: World, rng: np.random.Generator) -> None:
         """Forget the last episode.

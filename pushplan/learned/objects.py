@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from typing import Any
 
@@ -76,8 +77,6 @@ class ObjectPolicy:
 
 
 def _takes(function: Callable[..., Any], name: str) -> bool:
-    import inspect
-
     try:
         parameters = inspect.signature(function).parameters.values()
     except (TypeError, ValueError):
@@ -87,8 +86,6 @@ def _takes(function: Callable[..., Any], name: str) -> bool:
 
 def _needs_nothing(function: Callable[..., Any]) -> bool:
     """Return True if a function can be called without arguments."""
-    import inspect
-
     try:
         inspect.signature(function).bind()
     except (TypeError, ValueError):

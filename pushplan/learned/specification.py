@@ -134,42 +134,7 @@ class Specification(CheckedFields):
             training=training,
         )
 
-    def check_environment(self, env: Any, label: str, scenario: Any = None) -> None:
-        """Refuse an environment that the network was not made for.
-
-        Only what the environment tells about itself is compared: ``task.name``,
-        ``task.control_step``, ``task.waypoint_window``, ``task.heading_step`` and
-        ``observation_space``; and ``preset`` of the scenario.
-
-        Raises:
-            InvalidInputError: naming what the file says and what the environment has.
-        """
-        task = getattr(env, "task", None)
-        for kind, mine, theirs in (
-            ("task", self.tasks, getattr(task, "name", None)),
-            ("preset", self.presets, getattr(scenario, "preset", None)),
-        ):
-            if mine and isinstance(theirs, str) and theirs not in mine:
-                raise _mismatch(label, kind, ", ".join(mine), theirs)
-        lengths = (
-            ("control_step [s]", self.control_step, getattr(task, "control_step", None)),
-            ("waypoint_window [m]", self.action.window, getattr(task, "waypoint_window", None)),
-            ("heading_step [m]", self.action.step, getattr(task, "heading_step", None)),
-        )
-        for kind, length, has in lengths:
-            if length and has is not None and not close(length, has):
-                raise _mismatch(label, kind, f"{length:g}", f"{has:g}")
-        space = getattr(env, "observation_space", None)
-        if space is not None and space.shape != self.observation.shape:
-            raise _mismatch(label, "observation shape", self.observation.shape, space.shape)
-
 
 def close(a: float, b: float) -> bool:
     """Return True if two lengths, speeds or times are equal within the tolerance."""
     return math.isclose(a, b, rel_tol=_TOLERANCE)
-
-
-def _mismatch(label: str, kind: str, mine: object, theirs: object) -> InvalidInputError:
-    return InvalidInputError(
-        f"policy {label!r} was made for {kind} {mine}, the environment has {theirs}"
-    )

@@ -12,7 +12,7 @@ import multiprocessing
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import repeat
 from pathlib import Path
 from typing import Any
@@ -31,7 +31,6 @@ log = logging.getLogger(__name__)
 LEVELS = 16
 """Coverage is stored in steps of 1 / 16, which is what it is drawn in."""
 VOYAGES_PER_SHARD = 10
-_ARRAYS = ("patches", "after", "work")
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +45,9 @@ class IcePairs:
         return len(self.work)
 
 
+_NAMES = tuple(field.name for field in fields(IcePairs))
+
+
 def voyage_pairs(seed: int, split: str) -> IcePairs:
     """The pairs of one voyage."""
     batch, truth = voyage_passages(seed, split)
@@ -56,8 +58,9 @@ def voyage_pairs(seed: int, split: str) -> IcePairs:
     )
 
 
-def _joined(pairs: Sequence[IcePairs]) -> dict[str, Any]:
-    return {name: np.concatenate([getattr(p, name) for p in pairs]) for name in _ARRAYS}
+def _joined(pairs: Sequence[IcePairs]) -> IcePairs:
+    columns = zip(*(vars(one).values() for one in pairs), strict=True)
+    return IcePairs(*map(np.concatenate, columns))
 
 
 def write_shard(folder: str | Path, split: str, index: int) -> Path:
@@ -66,9 +69,9 @@ def write_shard(folder: str | Path, split: str, index: int) -> Path:
     if path.exists():
         return path
     seeds = range(index * VOYAGES_PER_SHARD, (index + 1) * VOYAGES_PER_SHARD)
-    arrays = _joined([voyage_pairs(seed, split) for seed in seeds])
+    pairs = _joined([voyage_pairs(seed, split) for seed in seeds])
     with replacing(path) as file:
-        np.savez_compressed(file, **arrays)
+        np.savez_compressed(file, **vars(pairs))
     return path
 
 
@@ -110,11 +113,11 @@ def read_shards(folder: str | Path, split: str, limit: int | None = None) -> Ice
             f"no shards {split}-*.npz in {folder}: make them with "
             f"'python -m pushplan.training.ice_data --out {folder} --split {split}'"
         )
-    return IcePairs(**_joined([_read(path) for path in paths]))
+    return _joined([_read(path) for path in paths])
 
 
 def _read(path: Path) -> IcePairs:
-    pairs = IcePairs(**read_npz(path, "shard of ice passages", _ARRAYS))
+    pairs = IcePairs(**read_npz(path, "shard of ice passages", _NAMES))
     count = len(pairs.work)
     if pairs.patches.shape[:2] != (count, 3) or pairs.after.shape[0] != count:
         raise InvalidInputError(f"{path} is not a shard of ice passages: shapes disagree")

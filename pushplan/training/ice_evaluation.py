@@ -26,7 +26,7 @@ from pushplan.interaction.occupancy import (
 )
 from pushplan.interaction.occupancy_models import ICE_FRICTION, InteractionOccupancy
 from pushplan.training.ice_passages import PassageConfig, voyage_passages
-from pushplan.world.checks import BoolArray, integer
+from pushplan.world.checks import integer
 
 AROUND = 5
 """Cells about the swath that belong to its window: half a hull length."""
@@ -45,25 +45,19 @@ class PredictionScores:
     milliseconds: float  # median time for a passage
 
 
-def swath_windows(batch: PassageBatch) -> BoolArray:
-    """(B, 40, 40) cells near the swath of each passage."""
-    near = np.ones((1, 2 * AROUND + 1, 2 * AROUND + 1), dtype=bool)
-    window: BoolArray = binary_dilation(batch.patches[:, 2] > 0.0, near)
-    return window
-
-
 def score(
     batches: Sequence[tuple[PassageBatch, OccupancyForecast]], predictor: OccupancyPredictor
 ) -> PredictionScores:
     """Score a predictor on batches with their truth."""
     predictor.predict(batches[0][0])  # loads and compiles
     columns, times = [], []
+    around = np.ones((1, 2 * AROUND + 1, 2 * AROUND + 1), dtype=bool)
     for batch, truth in batches:
         began = time.perf_counter()
         found = predictor.predict(batch)
         times.append((time.perf_counter() - began) / len(batch))
         error = (found.after - truth.after).astype(np.float64) ** 2
-        window = swath_windows(batch)
+        window = binary_dilation(batch.patches[:, 2] > 0.0, around)  # (B, 40, 40)
         near = (error * window).sum(axis=(1, 2)) / window.sum(axis=(1, 2))
         columns.append((error.mean(axis=(1, 2)), near, found.work, truth.work))
     patch, swath, work, true = map(np.concatenate, zip(*columns, strict=True))

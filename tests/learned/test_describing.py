@@ -12,6 +12,7 @@ from policy_files import maze_specification
 
 from pushplan.envs import PushEnv
 from pushplan.learned import FeatureObservation, Specification, describe, save_sb3
+from pushplan.learned.network_policy import NetworkPolicy
 from pushplan.world import InvalidInputError, UnknownNameError
 
 
@@ -63,7 +64,7 @@ class TestDescribe:
     def test_what_it_says_fits_the_environment(self, task, action, shape):
         env = PushEnv(task=task, action=action, observation=FeatureObservation())
         found = Specification.from_json(describe(env).to_json())
-        found.check_environment(env, "policy")
+        NetworkPolicy(np.zeros, found).check_environment(env)
         assert found.action.shape == shape and found.robot.difference(env.task.robot) is None
         assert found.observation == FeatureObservation()
 

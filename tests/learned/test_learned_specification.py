@@ -89,7 +89,7 @@ class TestJson:
 class TestEnvironment:
     def test_the_right_one_passes(self):
         env = PushEnv(task="maze", observation="state")
-        maze_specification().check_environment(env, "p")
+        NetworkPolicy(np.zeros, maze_specification()).check_environment(env)
         assert RobotSpec.of(env.task.robot) == maze_specification().robot
 
     def test_both_sides_are_named(self):
@@ -103,16 +103,16 @@ class TestEnvironment:
             ),
         ):
             with pytest.raises(InvalidInputError, match=message):
-                specification.check_environment(env, "p")
+                NetworkPolicy(np.zeros, specification).check_environment(env)
 
     def test_maps_have_the_window_that_waypoints_reach(self):
         spec = map_specification()
         env = PushEnv(task="box_delivery", action="waypoint", observation=spec.observation)
-        spec.check_environment(env, "p")
+        NetworkPolicy(np.zeros, spec).check_environment(env)
         area = PushEnv(task="area_clearing", action="waypoint", observation=spec.observation)
         wide = map_specification(tasks=("area_clearing",), control_step=0.0)
         with pytest.raises(InvalidInputError, match=r"waypoint_window \[m\] 10, .* has 24"):
-            wide.check_environment(area, "p")
+            NetworkPolicy(np.zeros, wide).check_environment(area)
 
 
 class TestOutputs:

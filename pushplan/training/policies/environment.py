@@ -88,7 +88,13 @@ class TrainingEnv(gymnasium.Env[NDArray[Any], Any]):
     @property
     def specification(self) -> Specification:
         """Specification of a network that has learned here."""
-        facts = {"algorithm": self.config.algorithm}
+        config = self.config
+        facts = {
+            "algorithm": config.algorithm,
+            "scenarios": [dict(one) for one in config.scenarios],
+            "steps": config.steps,
+            "seed": config.seed,
+        }
         return specification_of(self._env.task, self._builder, self.action, facts)
 
     def reset(

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter
 from stable_baselines3 import DQN
 from stable_baselines3.common.utils import polyak_update
 from stable_baselines3.dqn.policies import DQNPolicy
@@ -103,14 +104,11 @@ class SpatialActionDqn(DQN):
 
     def _random_pixel(self, seen: NDArray[Any], rng: np.random.Generator) -> int:
         """Any pixel, or one at an object."""
-        rows, cols = seen.shape[1:]
         if self.occupancy is not None and rng.random() < self.options.at_objects:
-            at = np.argwhere(seen[self.occupancy] == MOVABLE)
-            if len(at):
-                spot = at[rng.integers(len(at))] + rng.integers(-_AROUND, _AROUND + 1, 2)
-                row, col = np.clip(spot, 0, (rows - 1, cols - 1)).tolist()
-                return int(row * cols + col)
-        return int(rng.integers(rows * cols))
+            near = maximum_filter(seen[self.occupancy] == MOVABLE, 2 * _AROUND + 1)
+            if near.any():
+                return int(rng.choice(np.flatnonzero(near)))
+        return int(rng.integers(seen[0].size))
 
     def train(self, gradient_steps: int, batch_size: int = 100) -> None:
         """Take gradient steps on decisions drawn from the replay buffer."""

@@ -13,7 +13,6 @@ import pushplan
 from pushplan.drawing.figure import COLUMN, DPI, STYLE
 from pushplan.imports.on_demand import need
 from pushplan.learned.sb3_saving import attach
-from pushplan.learned.specification import Specification
 from pushplan.training.libraries import chosen_device, hardware, parameter_count
 from pushplan.training.policies.config import IMITATING, TrainingConfig
 from pushplan.training.policies.environment import TrainingEnv
@@ -123,21 +122,8 @@ def _saved_actor(run: TrainingRun, model: Any, env: TrainingEnv) -> Any:
     path = run.path(MODEL)
     path.unlink(missing_ok=True)
     model.save(path)
-    attach(path, _specification(env))
+    attach(path, env.specification)
     return SquashedActor(model.policy, len(model.observation_space.shape) == 3)
-
-
-def _specification(env: TrainingEnv, **facts: Any) -> Specification:
-    """Return the specification of the network of a training."""
-    config, specification = env.config, env.specification
-    training = {
-        **specification.training,
-        "scenarios": [dict(one) for one in config.scenarios],
-        "steps": config.steps,
-        "seed": config.seed,
-        **facts,
-    }
-    return replace(specification, training=training)
 
 
 def _draw(run: TrainingRun) -> None:
@@ -188,7 +174,9 @@ def _finish(
         *([] if run.config.algorithm in IMITATING else ["stable_baselines3"]),
     ]
     best = max(run.curve, key=lambda point: (point.rank, point.steps))
-    path = export(network, _specification(env, best_steps=best.steps), run.path(POLICY))
+    specification = env.specification
+    facts = {**specification.training, "best_steps": best.steps}
+    path = export(network, replace(specification, training=facts), run.path(POLICY))
     run.record(
         parameters=parameter_count(network),
         bytes=path.stat().st_size,
