@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pushplan.world import InvalidInputError
-from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, PositiveInt
-from pushplan.world.checks import choice, integer
+from pushplan.world.checked_fields import CheckedFields, Each, Limits, NonNegativeFloat, PositiveInt
+from pushplan.world.checks import choice
 
 MODES = {"turn_rate": 1, "velocity": 2, "wheels": 2, "heading": 1, "waypoint": 2}
 """Action modes of `pushplan.envs` and the number of elements of an action."""
@@ -55,7 +55,7 @@ class ActionSpec(CheckedFields):
 
     mode: str
     output: str
-    shape: tuple[int, ...]
+    shape: Annotated[tuple[int, ...], Each(Limits(1, 4096))]
     repeat: PositiveInt = 1
     window: NonNegativeFloat = 0.0
     step: NonNegativeFloat = 0.0
@@ -64,10 +64,6 @@ class ActionSpec(CheckedFields):
         super().__post_init__()
         choice("action mode", self.mode, tuple(MODES))
         choice("output", self.output, OUTPUTS)
-        if isinstance(self.shape, str) or not hasattr(self.shape, "__iter__"):
-            raise InvalidInputError(f"action.shape must be a list of numbers, got {self.shape!r}")
-        shape = tuple(integer("action.shape", n, low=1, high=4096) for n in self.shape)
-        object.__setattr__(self, "shape", shape)
         self._check_together()
 
     def _check_together(self) -> None:

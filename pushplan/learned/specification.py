@@ -6,14 +6,14 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 from pushplan.files.safe_files import known_keys, parse_json
 from pushplan.learned.builders import builder_from_dict, builder_to_dict, from_mapping
 from pushplan.learned.outputs import ActionSpec
 from pushplan.observation import ObservationBuilder
-from pushplan.world import InvalidInputError, RobotModel, SchemaError
-from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, PositiveFloat
+from pushplan.world import RobotModel, SchemaError
+from pushplan.world.checked_fields import CheckedFields, Each, NonNegativeFloat, PositiveFloat
 
 FORMAT = "pushplan-policy/1"
 METADATA_KEY = "pushplan"
@@ -73,22 +73,13 @@ class Specification(CheckedFields):
         training: facts for people and model cards; JSON values, never interpreted.
     """
 
-    tasks: tuple[str, ...]
-    presets: tuple[str, ...]
+    tasks: Annotated[tuple[str, ...], Each(least=0)]
+    presets: Annotated[tuple[str, ...], Each(least=0)]
     robot: RobotSpec | None
     control_step: NonNegativeFloat
     observation: ObservationBuilder
     action: ActionSpec
     training: Mapping[str, Any] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        for name in ("tasks", "presets"):
-            given = getattr(self, name)
-            listed = isinstance(given, list | tuple)
-            if not listed or not all(isinstance(text, str) for text in given):
-                raise InvalidInputError(f"{name} must be a list of names, got {given!r:.80}")
-            object.__setattr__(self, name, tuple(given))
-        super().__post_init__()
 
     def to_json(self) -> str:
         """One line of JSON."""

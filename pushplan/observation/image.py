@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pushplan.observation.channels import CHANNELS
 from pushplan.observation.view import View
-from pushplan.world import InvalidInputError, UnknownNameError, World
-from pushplan.world.checked_fields import CheckedFields
-from pushplan.world.checks import integer, number
+from pushplan.world import UnknownNameError, World
+from pushplan.world.checked_fields import CheckedFields, Each, Limits
 
 
 @dataclass(frozen=True)
@@ -37,9 +35,14 @@ class ImageObservation(CheckedFields):
         InvalidInputError: if a size is not positive or the shift is not finite.
     """
 
-    channels: tuple[str, ...] = ("footprint", "movable", "static", "goal_distance")
-    window: tuple[float, float] = (12.0, 12.0)
-    pixels: tuple[int, int] = (192, 192)
+    channels: Annotated[tuple[str, ...], Each()] = (
+        "footprint",
+        "movable",
+        "static",
+        "goal_distance",
+    )
+    window: Annotated[tuple[float, float], Each(Limits(0.0, open_low=True))] = (12.0, 12.0)
+    pixels: Annotated[tuple[int, int], Each(Limits(1, 4096))] = (192, 192)
     north_up: bool = False
     shift: float = 0.0
 
@@ -49,24 +52,9 @@ class ImageObservation(CheckedFields):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        put = object.__setattr__
-        if isinstance(self.channels, str) or not isinstance(self.channels, Sequence):
-            raise InvalidInputError(f"channels must be a list of names, got {self.channels!r}")
-        put(self, "channels", tuple(self.channels))
-        if len(self.channels) == 0:
-            raise InvalidInputError("channels must name at least one channel")
         for name in self.channels:
             if name not in CHANNELS:
                 raise UnknownNameError("channel", name, CHANNELS)
-        for name in ("window", "pixels"):
-            sides = getattr(self, name)
-            if isinstance(sides, str) or not isinstance(sides, Sequence) or len(sides) != 2:
-                raise InvalidInputError(f"{name} needs two sides, height and width, got {sides!r}")
-            put(self, name, tuple(sides))
-        for side in self.window:
-            number("window", side, low=0.0, open_low=True)
-        for count in self.pixels:
-            integer("pixels", count, low=1, high=4096)
 
     @property
     def shape(self) -> tuple[int, int, int]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache, partial
 from typing import Annotated, Any, ClassVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 
+from pushplan.errors import InvalidInputError, short
 from pushplan.world.checks import array, boolean, choice, expect, integer, number, word
 
 
@@ -28,6 +29,17 @@ class OneOf:
     """Valid names, in ``Annotated[str, OneOf(...)]``."""
 
     valid: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Each:
+    """Rule of the entries of a tuple, in ``Annotated[tuple[int, ...], Each(Limits(1))]``.
+
+    There are as many entries as the type says, or at least ``least`` where it says ``...``.
+    """
+
+    rule: Limits | OneOf = Limits()
+    least: int = 1
 
 
 class Shape(tuple[int | str | None, ...]):
@@ -53,10 +65,10 @@ class CheckedFields:
     """Base of dataclasses that check their fields when an instance is made.
 
     A field of type float, int, bool or str takes a finite number, a whole number, a truth value or
-    a text and keeps it as that type; `Limits` and `OneOf` in the annotation say which ones. An
-    array becomes a read-only copy of the `Shape` in the annotation. A field whose type is a
-    dataclass takes an instance of it. None is left alone where the annotation allows it, and so are
-    fields of all other types.
+    a text and keeps it as that type; `Limits` and `OneOf` in the annotation say which ones. A tuple
+    with `Each` in the annotation takes a list of such values too. An array becomes a read-only copy
+    of the `Shape` in the annotation. A field whose type is a dataclass takes an instance of it.
+    None is left alone where the annotation allows it, and so are fields of all other types.
 
     Raises:
         InvalidInputError: naming the first field with a wrong value, the value and the rule.
@@ -110,6 +122,12 @@ def _checks(kind: Any) -> tuple[tuple[str, str, Callable[..., Any], bool, Shape 
 def _check(base: Any, note: Any) -> Callable[..., Any] | None:
     if isinstance(note, OneOf):
         return partial(choice, valid=note.valid)
+    if isinstance(note, Each):
+        entry, *others = get_args(base)
+        least, most = note.least, math.inf
+        if others != [Ellipsis]:
+            least = most = 1 + len(others)
+        return partial(_entries, kind=entry, check=_check(entry, note.rule), least=least, most=most)
     if isinstance(note, Shape):
         kind = get_args(base)[-1]  # of an NDArray: a dtype, and since NumPy 2.5 its scalar
         return partial(array, dtype=np.dtype((get_args(kind) or (kind,))[0]))
@@ -122,3 +140,15 @@ def _check(base: Any, note: Any) -> Callable[..., Any] | None:
         float: number if note == Limits() else partial(number, **vars(note)),
     }
     return plain.get(base)
+
+
+def _entries(
+    name: str, value: object, *, kind: Any, check: Any, least: int, most: float
+) -> tuple[Any, ...]:
+    """The checked entries of a list, from ``least`` to ``most`` of them."""
+    entries = value if isinstance(value, Sequence) and not isinstance(value, str) else None
+    if entries is None or not least <= len(entries) <= most:
+        count = f"{least} " if least == most else "one or more " if least else ""
+        noun = "names" if kind is str else "numbers"
+        raise InvalidInputError(f"{name} must be a list of {count}{noun}, got {short(value)}")
+    return tuple(check(f"{name}[{i}]", one) for i, one in enumerate(entries))

@@ -12,6 +12,7 @@ from pushplan.imports.on_demand import look_up
 from pushplan.world import InvalidInputError, UnknownNameError
 from pushplan.world.checked_fields import (
     CheckedFields,
+    Each,
     Fraction,
     Limits,
     NonNegativeFloat,
@@ -31,6 +32,9 @@ class Settings(CheckedFields):
     kind: Annotated[str, OneOf(("fast", "slow"))] = "fast"
     turn: Annotated[float, Limits(-1.0, 1.0, open_low=True)] = 0.0
     free: tuple[int, ...] = ()
+    names: Annotated[tuple[str, ...], Each(least=0)] = ()
+    sides: Annotated[tuple[float, float], Each(Limits(0.0))] = (1.0, 1.0)
+    counts: Annotated[tuple[int, ...], Each(Limits(1))] = (1,)
 
 
 @dataclass(frozen=True)
@@ -44,6 +48,9 @@ def test_values_become_what_the_type_says():
     kinds = [type(value) for value in (made.speed, made.rounds, made.fraction, made.careful)]
     assert kinds == [float, int, float, bool]
     assert Settings(fraction=None).fraction is None
+    made = Settings(names=["a"], sides=[2, 3], counts=(np.int64(4), 5))  # type: ignore[arg-type]
+    assert (made.names, made.sides, made.counts) == (("a",), (2.0, 3.0), (4, 5))
+    assert [type(value) for value in (*made.sides, *made.counts)] == [float, float, int, int]
     assert Settings(free="whatever").free == "whatever"  # type: ignore[arg-type]
 
 
@@ -59,6 +66,11 @@ def test_values_become_what_the_type_says():
         ({"careful": 1}, "test careful must be true or false, got 1"),
         ({"kind": "fsat"}, "fast"),
         ({"turn": -1.0}, r"test turn must lie in \(-1, 1\]"),
+        ({"names": "ab"}, "test names must be a list of names, got 'ab'"),
+        ({"names": [3]}, r"test names\[0\] must be"),
+        ({"sides": (1.0,)}, r"test sides must be a list of 2 numbers, got \(1.0,\)"),
+        ({"sides": (1.0, -1.0)}, r"test sides\[1\] must lie in \[0, inf\), got -1"),
+        ({"counts": []}, r"test counts must be a list of one or more numbers, got \[\]"),
     ],
 )
 def test_an_error_names_field_value_and_rule(bad, text):

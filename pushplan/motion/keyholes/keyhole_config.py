@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
-from pushplan.world import InvalidInputError
 from pushplan.world.checked_fields import (
     CheckedFields,
+    Each,
     Fraction,
     NonNegativeFloat,
     PositiveFloat,
     PositiveFraction,
     PositiveInt,
 )
-from pushplan.world.checks import number
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class KeyholeConfig(CheckedFields):
     clearance: PositiveFloat = 1.06
     cell: PositiveFraction = 0.1
     margin: Fraction = 0.06
-    offsets: tuple[float, ...] = (0.0, 0.5, -0.5, 1.25, -1.25)
+    offsets: Annotated[tuple[float, ...], Each()] = (0.0, 0.5, -0.5, 1.25, -1.25)
     longest: PositiveFloat = 8.0
     step: PositiveFloat = 0.5
     gain: PositiveFloat = 4.0
@@ -52,10 +52,3 @@ class KeyholeConfig(CheckedFields):
     closed_cost: NonNegativeFloat = 3.0
     rank_cost: NonNegativeFloat = 3.0
     default_pushes: PositiveInt = 600
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not isinstance(self.offsets, tuple | list) or not self.offsets:
-            raise InvalidInputError(f"offsets must be one number or more, got {self.offsets!r}")
-        clean = tuple(number(f"offsets[{i}]", value) for i, value in enumerate(self.offsets))
-        object.__setattr__(self, "offsets", clean)

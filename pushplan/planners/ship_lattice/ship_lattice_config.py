@@ -5,16 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Any, Self
 
-from pushplan.errors import InvalidInputError
 from pushplan.motion.state_lattice.lattice_config import LatticeConfig
 from pushplan.world.checked_fields import (
+    Each,
     Limits,
     NonNegativeFloat,
     NonNegativeInt,
     OneOf,
     PositiveInt,
 )
-from pushplan.world.checks import number
 
 FLOE_COSTS = ("displacement", "kinetic-energy")
 
@@ -47,17 +46,9 @@ class ShipLatticeConfig(LatticeConfig):
     exponent: Annotated[float, Limits(-0.9, 4.0)] = -0.5
     side: NonNegativeFloat = 0.75
     batch: PositiveInt = 100
-    searches: tuple[float, ...] = (1.0, 0.0, 0.5, 2.0, 4.0)
+    searches: Annotated[tuple[float, ...], Each(Limits(0.0))] = (1.0, 0.0, 0.5, 2.0, 4.0)
     shortcuts: NonNegativeInt = 60
     sweep_horizon: NonNegativeFloat = 10.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not isinstance(self.searches, (tuple, list)) or len(self.searches) == 0:
-            raise InvalidInputError(f"searches must be one factor or more, got {self.searches!r}")
-        object.__setattr__(self, "searches", tuple(self.searches))
-        for factor in self.searches:
-            number("searches", factor, low=0.0)
 
     @classmethod
     def quick(cls) -> Self:

@@ -18,6 +18,7 @@ from pushplan.training.policies.options import OPTIONS, Options
 from pushplan.world import InvalidInputError, SchemaError, UnknownNameError
 from pushplan.world.checked_fields import (
     CheckedFields,
+    Each,
     NonNegativeInt,
     OneOf,
     PositiveFloat,
@@ -70,7 +71,7 @@ class TrainingConfig(CheckedFields):
     limit: NonNegativeInt = 0
     validation: NonNegativeInt = 20  # episodes of each validation
     # on which the result is scored, with scenarios that training never draws
-    suites: tuple[str, ...] = ()
+    suites: Annotated[tuple[str, ...], Each(least=0)] = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -104,11 +105,10 @@ class TrainingConfig(CheckedFields):
         needed = ("algorithm", "task", "scenarios", "observation", "action")
         known_keys(kind, data, [field.name for field in fields(cls)], needed)
         algorithm = choice("algorithm", data["algorithm"], ALGORITHMS)
-        for name in ("scenarios", "suites"):
-            given = data.get(name, ())
-            if not isinstance(given, list | tuple):
-                raise SchemaError(f"{name} must be a list, got {given!r:.60}")
-        if not all(isinstance(one, Mapping) for one in data["scenarios"]):
+        given = data["scenarios"]
+        if not isinstance(given, list | tuple):
+            raise SchemaError(f"scenarios must be a list, got {given!r:.60}")
+        if not all(isinstance(one, Mapping) for one in given):
             raise SchemaError("each of scenarios must be a mapping of variations")
         options = OPTIONS[algorithm]
         parts = {

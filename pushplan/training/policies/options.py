@@ -3,34 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
-from pushplan.world import InvalidInputError
 from pushplan.world.checked_fields import (
     CheckedFields,
+    Each,
     Fraction,
+    Limits,
     NonNegativeFloat,
     PositiveFloat,
     PositiveFraction,
     PositiveInt,
 )
-from pushplan.world.checks import integer
 
-
-class AlgorithmOptions(CheckedFields):
-    """Base of the parameters of an algorithm: numbers, and the widths of its network."""
-
-    widths: tuple[int, ...]
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not isinstance(self.widths, tuple) or not self.widths:
-            raise InvalidInputError(f"widths must be a list of whole numbers, got {self.widths!r}")
-        for width in self.widths:
-            integer("width", width, low=1)
+Widths = Annotated[tuple[int, ...], Each(Limits(1))]
 
 
 @dataclass(frozen=True)
-class PpoOptions(AlgorithmOptions):
+class PpoOptions(CheckedFields):
     """Proximal policy optimisation (Schulman et al. 2017, arXiv 1707.06347)."""
 
     # learning rate at the start; it falls linearly to a tenth at the end
@@ -43,11 +33,11 @@ class PpoOptions(AlgorithmOptions):
     clip: PositiveFloat = 0.2  # of the probability ratio
     entropy: NonNegativeFloat = 0.0  # weight of the entropy
     deviation: float = -0.5  # logarithm of the first standard deviation of actions
-    widths: tuple[int, ...] = (128, 128)  # of the hidden layers, for actor and critic each
+    widths: Widths = (128, 128)  # of the hidden layers, for actor and critic each
 
 
 @dataclass(frozen=True)
-class SacOptions(AlgorithmOptions):
+class SacOptions(CheckedFields):
     """Soft actor-critic (Haarnoja et al. 2018, arXiv 1801.01290)."""
 
     rate: PositiveFloat = 5e-4  # learning rate
@@ -59,11 +49,11 @@ class SacOptions(AlgorithmOptions):
     discount: Fraction = 0.99  # of a decision
     # fraction by which the target critics follow in each gradient step
     follow: PositiveFraction = 0.01
-    widths: tuple[int, ...] = (128, 128)  # of the hidden layers
+    widths: Widths = (128, 128)  # of the hidden layers
 
 
 @dataclass(frozen=True)
-class SamOptions(AlgorithmOptions):
+class SamOptions(CheckedFields):
     """Double deep Q-learning on spatial action maps (Wu et al. 2020, arXiv 2004.09141)."""
 
     rate: PositiveFloat = 5e-4  # learning rate of Adam at the start; it falls linearly to a tenth
@@ -87,7 +77,10 @@ class SamOptions(AlgorithmOptions):
     clip: PositiveFloat = 10.0  # greatest norm of the gradient
     # learn from mirrored maps as often as from others; both tasks are symmetric
     mirror: bool = True
-    widths: tuple[int, ...] = (16, 32)  # channels at half and at a quarter of the map's resolution
+    widths: Annotated[tuple[int, int], Each(Limits(1))] = (
+        16,
+        32,
+    )  # channels at half and at a quarter of the map's resolution
     blocks: PositiveInt = 4  # residual blocks at a quarter
     # factor by which the network is coarser than that behind its first layer; 2 for maps of twice
     # the resolution
@@ -96,20 +89,15 @@ class SamOptions(AlgorithmOptions):
     # layers. Random ones by default.
     start: str = ""
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if len(self.widths) != 2:
-            raise InvalidInputError(f"widths of sam are two numbers, got {self.widths}")
-
 
 @dataclass(frozen=True)
-class BcOptions(AlgorithmOptions):
+class BcOptions(CheckedFields):
     """Behaviour cloning: regression of the actions in a data set."""
 
     rate: PositiveFloat = 1e-3  # greatest learning rate of Adam, on a one-cycle schedule
     batch: PositiveInt = 256  # decisions in a gradient step
     held_out: Fraction = 0.1  # fraction of the episodes that only measure the error
-    widths: tuple[int, ...] = (128, 128)  # of the hidden layers
+    widths: Widths = (128, 128)  # of the hidden layers
     decay: NonNegativeFloat = 1e-5  # of the weights
 
 
@@ -121,7 +109,7 @@ class FlowOptions(BcOptions):
     arXiv 2303.04137).
     """
 
-    widths: tuple[int, ...] = (256, 256)  # of the hidden layers of the velocity
+    widths: Widths = (256, 256)  # of the hidden layers of the velocity
     euler: PositiveInt = 5  # steps of Euler's method from noise to a chunk
 
 
