@@ -32,8 +32,8 @@ from pushplan.training.policies.dataset import (
 from pushplan.training.policies.demonstrations import action_chunks
 from pushplan.training.policies.environment import TRAINING_SEEDS, TrainingEnv
 from pushplan.training.policies.options import OPTIONS
-from pushplan.training.policies.run import CurvePoint, TrainingRun
 from pushplan.training.policies.training import train_policy
+from pushplan.training.policies.training_run import CurvePoint, TrainingRun
 from pushplan.world import InvalidInputError, SchemaError, UnknownNameError
 
 SMALL = {"kind": "features", "rays": 4, "objects": 1, "range": 6.0}
@@ -505,7 +505,7 @@ class TestSamLearner:
         options = {**TINY["sam"], "start": str(first.with_suffix("")), **never}
         config = tiny("sam", seed=1, options=options)
         learner = sam_learner(tmp_path / "by hand", seed=1, options=options)
-        learner.begin_with(options["start"])
+        learner.policy.begin_with(options["start"])
         networks = (learner.policy.q_net, learner.policy.q_net_target)
         seen = np.random.default_rng(0).integers(0, 255, (4, 16, 16)).astype(np.uint8)
         with torch.no_grad():

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from pushplan.imports.on_demand import need
-from pushplan.training.policies.run import RECORD
+from pushplan.training.policies.training_run import RECORD
 from pushplan.world import SchemaError
 
 ScoreRow = Mapping[str, Any]

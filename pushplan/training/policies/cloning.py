@@ -16,7 +16,7 @@ from pushplan.training.policies.environment import TrainingEnv
 from pushplan.training.policies.flow_network import FlowPolicy
 from pushplan.training.policies.networks import DirectPolicy
 from pushplan.training.policies.options import BcOptions, FlowOptions
-from pushplan.training.policies.run import Learned, chunk_seed
+from pushplan.training.policies.training_run import Learned, chunk_seed
 
 _LEAST_RATE = 0.01
 

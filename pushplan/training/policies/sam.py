@@ -17,6 +17,9 @@ from stable_baselines3 import DQN
 from stable_baselines3.common.utils import polyak_update
 from stable_baselines3.dqn.policies import DQNPolicy
 
+from pushplan.imports.on_demand import need
+from pushplan.learned.loading import learned_file, learned_names, weights_of
+from pushplan.learned.onnx_guard import inspect
 from pushplan.observation.channels import MOVABLE
 from pushplan.training.policies.config import TrainingConfig
 from pushplan.training.policies.networks import SpatialActionNetwork
@@ -56,9 +59,55 @@ class SpatialActionPolicy(DQNPolicy):
         made: Any = SpatialActionNetwork(shape[0], **network)
         return made.to(self.device, memory_format=torch.channels_last)
 
+    def begin_with(self, source: str) -> None:
+        """Take the weights of a shipped policy, or an ONNX file, whose network is like this one.
+
+        Raises:
+            InvalidInputError: if there is no such file, or its weights are not those of such a
+                network.
+        """
+        found = _exported_weights(source)
+        wanted = {name: tuple(entry.shape) for name, entry in self.q_net.state_dict().items()}
+        for name in dict.fromkeys((*wanted, *found)):
+            there = tuple(found[name].shape) if name in found else "missing"
+            if there != wanted.get(name):
+                raise InvalidInputError(
+                    f"start {source!r} does not fit the network to be trained: {name} is {there} "
+                    f"there and {wanted.get(name, 'missing')} here"
+                )
+        for network in (self.q_net, self.q_net_target):
+            network.load_state_dict(found)
+
     def _predict(self, obs: Any, deterministic: bool = True) -> torch.Tensor:
         best: torch.Tensor = self.acting(obs).flatten(1).argmax(1)
         return best
+
+
+def _exported_weights(source: str) -> dict[str, torch.Tensor]:
+    """The weights by name, as tensors; looked through as any policy's file."""
+    onnx = need("onnx")
+    if source in learned_names():
+        path = weights_of(source)
+    else:
+        try:
+            path = learned_file(source if source.startswith("onnx:") else f"onnx:{source}")
+        except InvalidInputError as error:
+            names = ", ".join(learned_names())
+            raise InvalidInputError(f"start: {error}, nor is it one of {names}") from error
+    data = path.read_bytes()
+    try:
+        inspect(data)
+        graph = onnx.load_model_from_string(data).graph
+        found = {
+            entry.name: torch.from_numpy(onnx.numpy_helper.to_array(entry).copy())
+            for entry in graph.initializer
+        }
+    except Exception as error:  # protobuf has errors of its own
+        raise InvalidInputError(f"start {source!r} cannot be read: {error}") from error
+    weights = {name: entry for name, entry in found.items() if name.endswith(("weight", "bias"))}
+    if not all(bool(torch.isfinite(entry).all()) for entry in weights.values()):
+        raise InvalidInputError(f"start {source!r} holds weights that are not finite")
+    return weights
 
 
 class SpatialActionDqn(DQN):

@@ -15,11 +15,10 @@ from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv
 
 from pushplan.training.policies.config import TrainingConfig
 from pushplan.training.policies.environment import TrainingEnv
-from pushplan.training.policies.initial import load_weights
 from pushplan.training.policies.networks import SmallEncoder
 from pushplan.training.policies.options import PpoOptions, SamOptions
-from pushplan.training.policies.run import Learned, chunk_seed
 from pushplan.training.policies.sam import SpatialActionDqn, SpatialActionPolicy
+from pushplan.training.policies.training_run import Learned, chunk_seed
 
 _LEAST_RATE = 0.1
 _ARGUMENTS = {
@@ -122,12 +121,6 @@ class Sb3Learner:
     def buffer(self) -> Any:
         """The replay buffer, None with PPO."""
         return getattr(self.model, "replay_buffer", None)
-
-    def begin_with(self, source: str) -> None:
-        """Take the weights of a network that was exported before."""
-        policy = self.policy
-        load_weights(policy.q_net, source)
-        policy.q_net_target.load_state_dict(policy.q_net.state_dict())
 
     def learn(self, steps: range, seed: int) -> Learned:
         """Learn with fresh episodes and generators, and the rate of this part of the training."""

@@ -17,7 +17,7 @@ from pushplan.training.libraries import chosen_device, hardware, parameter_count
 from pushplan.training.policies.config import IMITATING, TrainingConfig
 from pushplan.training.policies.environment import TrainingEnv
 from pushplan.training.policies.options import SamOptions
-from pushplan.training.policies.run import (
+from pushplan.training.policies.training_run import (
     CHECKPOINT,
     CURVE,
     MODEL,
@@ -111,7 +111,7 @@ def _learner(
     learner = Sb3Learner(config, device, processes, run.folder)
     start = getattr(config.options, "start", "")
     if start and not run.path(CHECKPOINT).is_file():
-        learner.begin_with(start)
+        learner.policy.begin_with(start)
     return learner
 
 
