@@ -216,8 +216,7 @@ def _judge(
         low = float(welch.low) / (unit or 1.0)
         high = float(welch.high) / (unit or 1.0)
     sign = 1.0 if rule.above else -1.0
-    worst = max(sign * low, sign * high)
-    best = min(sign * low, sign * high)
+    best, worst = sorted((sign * low, sign * high))
     bound = sign * rule.bound
     verdict = "regressed" if best > bound else "ok" if worst <= bound else "unclear"
     if count < ENOUGH and (low != 0.0 or high != 0.0) and verdict != "ok":

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+import string
 import textwrap
 import unicodedata
 from collections.abc import Iterator, Sequence
@@ -19,8 +20,14 @@ _LETTERS = 26  # on a line of a cell
 _LINES = 36  # of a table on a page
 _PARTS = 3  # groups of columns on a page
 _FLOATS = 10  # tables that LaTeX is given before it has to place them
-_NARROW = frozenset("iljft.,:;'`|!()[]/ -1I")
-_BROAD = frozenset("mwMW@%&<>=+~")
+_LETTER = 4.6  # width of what is not listed [pt]
+_BROADEST = 8.0  # width of what is not ASCII, at most [pt]
+_WIDTHS = {
+    **dict.fromkeys(string.ascii_uppercase, 5.5),
+    **dict.fromkeys("mwMW@%&<>=+~", _BROADEST),
+    **dict.fromkeys("iljft.,:;'`|!()[]/ -1I", 3.5),
+}
+"""Widths of letters of 8 pt, never less than they are [pt]."""
 _CHARACTERS = read_data(Path(__file__).with_name("latex_symbols.json"))
 _SYMBOLS: dict[str, str] = _CHARACTERS["symbols"]
 _ACCENTS: dict[str, str] = _CHARACTERS["accents"]
@@ -59,18 +66,9 @@ def _lines(cell: str) -> list[str]:
 
 
 def _width(lines: Sequence[str]) -> float:
-    """Width of a column that holds a cell, in letters of 8 pt, never less than it is [pt]."""
+    """Width of a column that holds a cell [pt]."""
     widths = [
-        sum(
-            3.5
-            if c in _NARROW
-            else 8.0
-            if c in _BROAD or not c.isascii()
-            else 5.5
-            if c.isupper()
-            else 4.6
-            for c in line
-        )
+        sum(_WIDTHS.get(letter, _LETTER if letter.isascii() else _BROADEST) for letter in line)
         for line in lines
     ]
     return max(widths) + 2.0 * _SEPARATION

@@ -159,18 +159,13 @@ def _colours() -> dict[str, Any]:
 
 def _values(run: StoredRun) -> dict[str, list[float | None]]:
     """Columns that have values, rounded, and metrics that are no columns."""
-    found = {}
-    for name in (*metric_names(Role.SCORE, Role.DETAIL, Role.FACT), *_TIMES):
-        column = [_rounded(getattr(row, name)) for row in run.rows]
-        if any(value is not None for value in column):
-            found[name] = column
-    for name in run.about.get("metrics", ()):
-        found[name] = [_rounded(run.measured.get(row.job, {}).get(name)) for row in run.rows]
-    return found
-
-
-def _rounded(value: float | None) -> float | None:
-    return None if value is None else float(f"{value:.{_DIGITS}g}")
+    names = (*metric_names(Role.SCORE, Role.DETAIL, Role.FACT), *_TIMES)
+    own = {name: [getattr(row, name) for row in run.rows] for name in names}
+    filled = {name: column for name, column in own.items() if set(column) != {None}}
+    return {
+        name: [None if value is None else float(f"{value:.{_DIGITS}g}") for value in column]
+        for name, column in {**filled, **run.measured_columns}.items()
+    }
 
 
 def _file(name: str) -> str:

@@ -76,49 +76,46 @@ def draw(run: StoredRun, name: str) -> Figure | None:
 def _tradeoff(run: StoredRun) -> Figure | None:
     """E against I: one dot an episode, the mean with its intervals."""
 
-    def panel(axes: Any, rows: Sequence[ResultRow]) -> None:
+    def cloud(axes: Any, rows: Sequence[ResultRow], index: int, label: str) -> None:
         kind = "nav" if values_of(rows, "E_nav") else "manip"
-        names = (f"I_{kind}", f"E_{kind}")
-        for i, label in enumerate(run.policies):
-            mine = [r for r in rows if r.policy == label]
-            points = [
-                (x, y)
-                for r in mine
-                if (x := getattr(r, names[0])) is not None
-                and (y := getattr(r, names[1])) is not None
-            ]
-            if not points:
-                continue
-            xy = np.array(points, dtype=float)
-            many = len(xy) > _MANY
-            cloud = axes.scatter(*xy.T, s=10, alpha=0.35, linewidths=0, rasterized=many, **dots(i))
-            across = estimate(xy[:, 0])
-            up = estimate(xy[:, 1])
-            bar = axes.errorbar(
-                across.mean,
-                up.mean,
-                xerr=interval(across),
-                yerr=interval(up),
-                markersize=6,
-                markeredgecolor="black",
-                ecolor="black",
-                elinewidth=1.0,
-                capsize=2,
-                linestyle="none",
-                label=label,
-                zorder=5,
-                **dots(i),
-            )
-            unclipped(cloud, bar.lines[0])
+        pairs = [(getattr(row, f"I_{kind}"), getattr(row, f"E_{kind}")) for row in rows]
+        xy = np.array([pair for pair in pairs if None not in pair], dtype=float)
+        if len(xy) == 0:
+            return
+        points = _cloud(axes, *xy.T, index, s=10, alpha=0.35)
+        across = estimate(xy[:, 0])
+        up = estimate(xy[:, 1])
+        bar = axes.errorbar(
+            across.mean,
+            up.mean,
+            xerr=interval(across),
+            yerr=interval(up),
+            markersize=6,
+            markeredgecolor="black",
+            ecolor="black",
+            elinewidth=1.0,
+            capsize=2,
+            linestyle="none",
+            label=label,
+            zorder=5,
+            **dots(index),
+        )
+        unclipped(points, bar.lines[0])
         axes.margins(0.08)
         axes.locator_params(nbins=4)
 
     labels = ("effort I (1 = pushed nothing)", "efficiency E (1 = shortest path)")
-    figure = _panels(run, ("I_nav", "I_manip"), panel, labels)
+    figure = _panels(run, ("I_nav", "I_manip"), cloud, labels)
     if figure is not None:  # after all panels, which share their limits
         figure.axes[0].set_xlim(right=1.02)
         figure.axes[0].set_ylim(top=max(1.03, figure.axes[0].get_ylim()[1]))
     return figure
+
+
+def _cloud(axes: Any, x: Any, y: Any, index: int, **style: Any) -> Any:
+    """A dot for each episode of a policy."""
+    many = len(x) > _MANY
+    return axes.scatter(x, y, linewidths=0, rasterized=many, **style, **dots(index))
 
 
 def _spread(run: StoredRun) -> Figure | None:
@@ -180,17 +177,7 @@ def _boxes(
             capprops={"color": colour},
         )
         places = i + rng.uniform(-0.18, 0.18, len(values))
-        many = len(values) > _MANY
-        cloud = axes.scatter(
-            *(values, places),
-            s=6,
-            **dots(place),
-            alpha=0.55,
-            linewidths=0,
-            zorder=3,
-            rasterized=many,
-        )
-        unclipped(cloud)
+        unclipped(_cloud(axes, values, places, place, s=6, alpha=0.55, zorder=3))
     axes.set_yticks(range(len(policies)), list(map(wrapped, policies)), fontsize=7.0)
     axes.set_ylim(len(policies) - 0.4, -0.6)
     axes.locator_params(axis="x", nbins=3)
@@ -202,15 +189,13 @@ def _profiles(run: StoredRun) -> Figure | None:
     kinds = [name for name in metric_names(Role.SCORE) if values_of(run.rows, name)]
     if not kinds:
         return None
-    figure = _sheet(len(kinds))
     thresholds = np.linspace(0.0, 1.0, 101)
-    for axes, name in zip(_grid(figure, len(kinds), sharex=False), kinds, strict=False):
+    groups = grouped(run.rows).items()
+
+    def panel(axes: Any, name: str) -> None:
         for i, label in enumerate(run.policies):
-            strata = [
-                np.array(values)
-                for (_, policy), rows in grouped(run.rows).items()
-                if policy == label and (values := values_of(rows, name))
-            ]
+            values = [values_of(rows, name) for (_, policy), rows in groups if policy == label]
+            strata = [np.array(one) for one in values if one]
             if not strata:
                 continue
             found = performance_profile(strata, thresholds)
@@ -220,10 +205,8 @@ def _profiles(run: StoredRun) -> Figure | None:
         axes.set_xlabel(f"{heading(name)} above")
         axes.set_ylim(0.0, 1.02)
         axes.locator_params(axis="x", nbins=3)
-        tidy(axes)
-    figure.supylabel("fraction of episodes", fontsize=8.0)
-    add_legend(figure)
-    return figure
+
+    return _sheet(kinds, panel, "fraction of episodes", sharex=False)
 
 
 def _planning_time(run: StoredRun) -> Figure | None:
@@ -233,17 +216,16 @@ def _planning_time(run: StoredRun) -> Figure | None:
     """
     read = len(run.rows) <= _TRACES
 
-    def panel(axes: Any, rows: Sequence[ResultRow]) -> None:
-        for i, label in enumerate(run.policies):
-            mine = [r for r in rows if r.policy == label and r.plan_time_median_s is not None]
-            times = np.sort(np.concatenate([_calls(run, row, read) for row in mine] or [[]]))
-            if len(times) == 0:
-                continue
-            fractions = np.arange(1, len(times) + 1) / len(times)
-            shown = np.unique(np.linspace(0, len(times) - 1, 500).round().astype(int))
-            axes.step(1e3 * times[shown], fractions[shown], where="post", label=label, **line(i))
-            if (deadline := run.about.get("deadlines", {}).get(label)) is not None:
-                axes.axvline(1e3 * deadline, color=line(i)["color"], linestyle=":", linewidth=1.0)
+    def curve(axes: Any, rows: Sequence[ResultRow], index: int, label: str) -> None:
+        mine = [row for row in rows if row.plan_time_median_s is not None]
+        times = np.sort(np.concatenate([_calls(run, row, read) for row in mine] or [[]]))
+        if len(times) == 0:
+            return
+        fractions = np.arange(1, len(times) + 1) / len(times)
+        shown = np.unique(np.linspace(0, len(times) - 1, 500).round().astype(int))
+        axes.step(1e3 * times[shown], fractions[shown], where="post", label=label, **line(index))
+        if (deadline := run.about.get("deadlines", {}).get(label)) is not None:
+            axes.axvline(1e3 * deadline, color=line(index)["color"], linestyle=":", linewidth=1.0)
         axes.set_xscale("log")
         axes.xaxis.set_major_locator(LogLocator(numticks=4))
         axes.xaxis.set_minor_formatter("")
@@ -251,7 +233,7 @@ def _planning_time(run: StoredRun) -> Figure | None:
         axes.set_ylim(0.0, 1.02)
 
     labels = ("time of a planning call [ms]", "fraction of calls")
-    return _panels(run, ("plan_time_median_s",), panel, labels)
+    return _panels(run, ("plan_time_median_s",), curve, labels)
 
 
 def _calls(run: StoredRun, row: ResultRow, read: bool) -> Any:
@@ -265,35 +247,45 @@ def _calls(run: StoredRun, row: ResultRow, read: bool) -> Any:
 def _panels(
     run: StoredRun,
     names: Sequence[str],
-    draw: Callable[[Any, Sequence[ResultRow]], None],
+    draw: Callable[[Any, Sequence[ResultRow], int, str], None],
     labels: tuple[str, str],
 ) -> Figure | None:
-    """One panel for each setting that has values of one of these columns, and a legend."""
-    settings = [
-        setting
-        for setting in run.titles
-        if any(values_of(run.rows_of(setting), name) for name in names)
-    ]
+    """One panel for each setting that has values of one of these columns.
+
+    Args:
+        run: the rows.
+        names: columns.
+        draw: called with axes, the rows of a policy in the setting, its place and its label.
+        labels: of the two axes.
+    """
+    settings = [one for one in run.titles if any(values_of(run.rows_of(one), n) for n in names)]
     if not settings:
         return None
-    figure = _sheet(len(settings))
-    panels = _grid(figure, len(settings))[: len(settings)]
-    for axes, setting in zip(panels, settings, strict=True):
-        draw(axes, run.rows_of(setting))
+
+    def panel(axes: Any, setting: str) -> None:
+        rows = run.rows_of(setting)
+        for label, place in run.policies_in(setting).items():
+            draw(axes, [row for row in rows if row.policy == label], place, label)
         axes.set_title(wrapped(run.titles[setting], TITLE_LETTERS))
+        if setting in settings[-2:]:
+            axes.set_xlabel(wrapped(labels[0], TITLE_LETTERS))
+
+    return _sheet(settings, panel, labels[1])
+
+
+def _sheet(
+    names: Sequence[str], panel: Callable[[Any, str], None], label: str, *, sharex: bool = True
+) -> Figure:
+    """A panel for each name, two beside each other, with one label on the left and a legend."""
+    columns = min(2, len(names))
+    size = (PANEL[0] * columns, PANEL[1] * math.ceil(len(names) / columns))
+    figure = Figure(figsize=size, layout="constrained")
+    for axes, name in zip(_grid(figure, len(names), sharex=sharex), names, strict=False):
+        panel(axes, name)
         tidy(axes)
-    for axes in panels[-2:]:
-        axes.set_xlabel(wrapped(labels[0], TITLE_LETTERS))
-    figure.supylabel(labels[1], fontsize=8.0)
+    figure.supylabel(label, fontsize=8.0)
     add_legend(figure)
     return figure
-
-
-def _sheet(panels: int) -> Figure:
-    """An empty figure for so many panels, two beside each other."""
-    columns = min(2, panels)
-    size = (PANEL[0] * columns, PANEL[1] * math.ceil(panels / columns))
-    return Figure(figsize=size, layout="constrained")
 
 
 def _intervals(run: StoredRun) -> Figure:

@@ -132,10 +132,7 @@ class Results(StoredRun):
             raise InvalidInputError(f"rows are written as .csv or .parquet, got {path.name!r}")
         if not path.absolute().parent.is_dir():
             raise InvalidInputError(f"there is no folder {path.parent} for {path.name!r}")
-        more = {
-            name: [self.measured.get(row.job, {}).get(name) for row in self.rows]
-            for name in self.about.get("metrics", [])
-        }
+        more = self.measured_columns
         if path.suffix == ".csv":
             data = rows_csv(self.rows, more).encode()
         else:

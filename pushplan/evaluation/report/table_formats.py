@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from pushplan.evaluation.report.latex_tables import latex as latex
 from pushplan.evaluation.report.tables import Table
-from pushplan.evaluation.statistics.estimates import Estimate
 from pushplan.evaluation.statistics.summary import PairedDifference, PolicySummary
 from pushplan.evaluation.store.rows import csv_text
 
@@ -31,13 +30,13 @@ def markdown(tables: Sequence[Table]) -> str:
 
 def summary_csv(summaries: Sequence[PolicySummary], titles: dict[str, str]) -> str:
     """One line for each setting, policy and metric, with all digits."""
-    lines: list[Sequence[object]] = []
+    lines = []
     for summary in summaries:
-        who = (titles.get(summary.setting, summary.setting), summary.policy)
-        rate = summary.success
-        lines.append((*who, "success", rate.count, rate.fraction, "", "", rate.low, rate.high))
-        lines += [(*who, name, *_numbers(value)) for name, value in summary.metrics.items()]
-    return csv_text("setting,policy,metric,count,mean,sd,median,low,high".split(","), lines)
+        who = {"setting": titles.get(summary.setting, summary.setting), "policy": summary.policy}
+        rate = {"mean": summary.success.fraction, **vars(summary.success)}
+        lines.append({**who, "metric": "success", **rate})
+        lines += [{**who, "metric": name, **vars(one)} for name, one in summary.metrics.items()]
+    return _csv("setting,policy,metric,count,mean,sd,median,low,high", lines)
 
 
 def differences_csv(pairs: Sequence[PairedDifference], titles: dict[str, str]) -> str:
@@ -46,20 +45,18 @@ def differences_csv(pairs: Sequence[PairedDifference], titles: dict[str, str]) -
         "setting,metric,first,second,count,mean,sd,median,low,high,better,worse,p_value,"
         "p_corrected,effect,needed,verdict"
     )
-    lines = [
-        (
-            *(titles.get(pair.setting, pair.setting), pair.metric, pair.first, pair.second),
-            *_numbers(pair.difference),
-            *(pair.better, pair.worse, pair.p_value, pair.p_corrected, pair.effect),
-            *("" if pair.needed is None else pair.needed, pair.verdict),
-        )
-        for pair in pairs
-    ]
-    return csv_text(names.split(","), lines)
+    lines = []
+    for pair in pairs:
+        title = titles.get(pair.setting, pair.setting)
+        facts = {**vars(pair), "setting": title, "verdict": pair.verdict}
+        lines.append({**facts, **vars(pair.difference)})
+    return _csv(names, lines)
 
 
-def _numbers(value: Estimate) -> tuple[float, ...]:
-    return value.count, value.mean, value.sd, value.median, value.low, value.high
+def _csv(names: str, lines: Sequence[Mapping[str, object]]) -> str:
+    """The values of these names, with commas between them; an empty field where there is none."""
+    header = names.split(",")
+    return csv_text(header, [[line.get(name) for name in header] for line in lines])
 
 
 def rich_table(table: Table) -> RichTable:

@@ -74,8 +74,13 @@ def probability_of_improvement(first: Strata, second: Strata) -> Aggregate:
             f"need the same settings of both policies, got {len(first)} and {len(second)}"
         )
 
+    from scipy import stats
+
     def exceeds(drawn: list[list[FloatArray]]) -> FloatArray:
-        found = [_mann_whitney(x, y) for x, y in zip(*drawn, strict=True)]
+        found = []
+        for x, y in zip(*drawn, strict=True):
+            test = stats.mannwhitneyu(x, y, axis=1, method="asymptotic")
+            found.append(test.statistic / (x.shape[1] * y.shape[1]))
         return np.asarray(np.mean(found, axis=0))
 
     return Aggregate(*map(float, _bootstrap([first, second], exceeds)))
@@ -99,16 +104,6 @@ def performance_profile(scores: Strata, thresholds: FloatArray) -> Profile:
 
     value, low, high = _bootstrap([scores], fractions, weight=len(thresholds))
     return Profile(np.asarray(thresholds), value, low, high)
-
-
-def _mann_whitney(first: FloatArray, second: FloatArray) -> FloatArray:
-    """(B,) U / (N M) of each line of (B, N) against that of (B, M)."""
-    from scipy import stats
-
-    count = first.shape[1]
-    ranks = stats.rankdata(np.concatenate([first, second], axis=1), axis=1)
-    above = ranks[:, :count].sum(axis=1) - 0.5 * count * (count + 1)
-    return np.asarray(above / (count * second.shape[1]))
 
 
 def _bootstrap(

@@ -66,6 +66,14 @@ class StoredRun:
         rows = tuple(replace(row, pool=title) for row in self.rows)
         return replace(self, rows=rows, about={**self.about, "settings": {}})
 
+    @property
+    def measured_columns(self) -> dict[str, list[float | None]]:
+        """Metrics that are no columns: name -> value of each row, None where it has none."""
+        return {
+            name: [self.measured.get(row.job, {}).get(name) for row in self.rows]
+            for name in self.about.get("metrics", ())
+        }
+
     def rows_of(self, setting: str) -> list[ResultRow]:
         """The rows of one setting."""
         return [row for row in self.rows if row.setting == setting]

@@ -118,8 +118,7 @@ def package_digest() -> str:
     for path in sorted(root.rglob("*")):
         where = path.relative_to(root)
         name = where.as_posix()
-        rooms = {where.parts[0], "/".join(where.parts[:2])}
-        rooms |= {name.removesuffix(".py")}
+        rooms = {where.parts[0], "/".join(where.parts[:2]), name.removesuffix(".py")}
         left_out = rooms & UNSEEN or path.suffix == ".md" or name.startswith(".")
         if path.is_file() and "__pycache__" not in where.parts and not left_out:
             digest.update(f"{name}\0".encode() + path.read_bytes() + b"\0")
