@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib.resources import files
@@ -64,8 +64,7 @@ class PendingKernels:
     """
 
     def __init__(self, *names: str) -> None:
-        known = [name for name in names if expected_kernels(name)]
-        self._missing = expected_kernels(*known) if known else frozenset()
+        self._missing = _used_by(names)
         self._seen = -_LINGER_S
 
     def finish(self) -> None:
@@ -110,15 +109,18 @@ def kernel_progress(*names: str) -> Iterator[KernelProgress]:
 
 def expected_kernels(*names: str) -> frozenset[str]:
     """Look up the kernels that names make ready; none if one of the names is not known."""
-    users = _users()
-    if not set(names) <= set().union(*users.values()):
-        return frozenset()
-    return frozenset(kernel for kernel, by in users.items() if not by.isdisjoint(names))
+    known = set().union(*_users().values()).issuperset(names)
+    return _used_by(names) if known else frozenset()
 
 
 def every_kernel() -> frozenset[str]:
     """The kernels that anything of `pushplan compile` makes ready."""
     return frozenset(_users())
+
+
+def _used_by(names: Sequence[str]) -> frozenset[str]:
+    """The kernels that any of these names makes ready."""
+    return frozenset(kernel for kernel, by in _users().items() if not by.isdisjoint(names))
 
 
 def _users() -> dict[str, set[str]]:
