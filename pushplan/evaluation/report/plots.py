@@ -82,7 +82,7 @@ def _tradeoff(run: StoredRun) -> Figure | None:
         xy = np.array([pair for pair in pairs if None not in pair], dtype=float)
         if len(xy) == 0:
             return
-        points = _cloud(axes, *xy.T, index, s=10, alpha=0.35)
+        points = _cloud(axes, xy[:, 0], xy[:, 1], index, s=10, alpha=0.35)
         across = estimate(xy[:, 0])
         up = estimate(xy[:, 1])
         bar = axes.errorbar(
