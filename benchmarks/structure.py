@@ -85,6 +85,16 @@ def kernels(module: Module) -> Iterator[ast.FunctionDef]:
                 yield node
 
 
+def packed_assignments(module: Module) -> int:
+    """Assignments of several values in one statement; only a swap needs one."""
+    return sum(
+        isinstance(node, ast.Assign)
+        and isinstance(node.value, ast.Tuple)
+        and any(isinstance(target, ast.Tuple) for target in node.targets)
+        for node in ast.walk(module.tree)
+    )
+
+
 def circles(modules: list[Module], root: str) -> list[list[str]]:
     """Sets of modules that import each other in a loop."""
     names = {module.name.removesuffix(".__init__") for module in modules}
@@ -178,6 +188,7 @@ def measure(folder: Path) -> tuple[dict[str, str], list[str]]:
         f"kernels with {MANY_ARGUMENTS} arguments or more": str(wide),
         "names imported between planner families": str(sum(crossing.values())),
         "circles": str(len(loops)),
+        "assignments of a tuple to a tuple": str(sum(map(packed_assignments, modules))),
     }
     figures |= {name: str(count) for name, count in mechanisms(modules, folder).items()}
     for room, lines in sorted(rooms.items()):

@@ -34,7 +34,8 @@ def checked_costs(costs: ArrayLike) -> NDArray[np.number]:
         raise InvalidInputError(f"costs must be numbers, got an array of {matrix.dtype}")
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.size:
         raise InvalidInputError(f"costs must have shape (N, N) with N >= 1, got {matrix.shape}")
-    low, high = matrix.min(), matrix.max()
+    low = matrix.min()
+    high = matrix.max()
     if np.isnan(low):
         u, v = np.argwhere(np.isnan(matrix))[0]
         raise InvalidInputError(f"costs must not be NaN, got NaN from node {u} to node {v}")

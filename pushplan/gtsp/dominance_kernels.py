@@ -24,7 +24,8 @@ def mark_needed(
     """
     left = EFFORT * len(costs) ** 2
     for c in range(len(offsets) - 1):
-        low, high = offsets[c], offsets[c + 1]
+        low = offsets[c]
+        high = offsets[c + 1]
         for v in range(low, high):
             for u in range(low, high):
                 if u == v or not needed[u]:

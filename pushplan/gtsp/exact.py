@@ -44,8 +44,14 @@ def _relax(values: FloatArray, block: FloatArray, size: int, out: FloatArray, wi
     """``out = min(out, values + block)`` over the rows of a block, four at a time."""
     i = 0
     while i + 3 < size:
-        a, b, c, d = values[i], values[i + 1], values[i + 2], values[i + 3]
-        row_a, row_b, row_c, row_d = block[i], block[i + 1], block[i + 2], block[i + 3]
+        a = values[i]
+        b = values[i + 1]
+        c = values[i + 2]
+        d = values[i + 3]
+        row_a = block[i]
+        row_b = block[i + 1]
+        row_c = block[i + 2]
+        row_d = block[i + 3]
         for j in range(width):
             x = min(a + row_a[j], b + row_b[j])
             y = min(c + row_c[j], d + row_d[j])
@@ -71,7 +77,8 @@ def table_mb(problem: Problem) -> float:
 
 def expected_seconds(problem: Problem) -> float:
     """About how long it takes [s]."""
-    free, width = problem.count - 1, problem.width
+    free = problem.count - 1
+    width = problem.width
     roots = int(np.diff(problem.offsets).min())
     return roots * free * max(free - 1, 1) * 2.0 ** (free - 2) * width**2 / ARCS_PER_SECOND
 
@@ -93,7 +100,8 @@ def solve_exactly(
     subsets = 1 << len(others)
     table = np.empty((subsets, *padded.names.shape))
     step = max(1, int(chunk_s / max(expected_seconds(problem) / subsets, 1e-9)))
-    best, nodes = np.inf, None
+    best = np.inf
+    nodes = None
     for root in roots:
         first = padded.pick(problem.costs[root])
         for low in range(1, subsets, step):

@@ -277,7 +277,8 @@ def _points(text: TsplibText, size: int) -> FloatArray:
 def _matrix(text: TsplibText, size: int) -> FloatArray:
     layout = text.choice("EDGE_WEIGHT_FORMAT", FORMATS)
     begin, rows = text.section("EDGE_WEIGHT_SECTION")
-    full, shift = layout == "FULL_MATRIX", 0 if "DIAG" in layout else 1
+    full = layout == "FULL_MATRIX"
+    shift = 0 if "DIAG" in layout else 1
     wanted = size * size if full else size * (size + 1 - 2 * shift) // 2
     values = [text.number(line, word) for line, words in rows for word in words]
     if len(values) != wanted:

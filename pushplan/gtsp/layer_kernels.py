@@ -96,8 +96,10 @@ def build(tour: Layers, order: IntArray, root_node: int) -> float:
     tour.at[root] = root_node
     tour.carry[:] = 0.0
     for p in range(count):
-        c, d = order[p], order[p + 1 if p + 1 < count else 0]
-        tour.after[c], tour.before[d] = d, c
+        c = order[p]
+        d = order[p + 1 if p + 1 < count else 0]
+        tour.after[c] = d
+        tour.before[d] = c
     tour.ahead[root, 0] = 0.0
     for p in range(1, count):
         c = order[p]
@@ -107,9 +109,11 @@ def build(tour: Layers, order: IntArray, root_node: int) -> float:
     _from(tour, True, order[count - 1], root, tour.out)
     total = tour.out[0]
     tour.behind[root, 0] = -total
-    tour.least[root, 0], tour.least[root, 1] = 0.0, -total
+    tour.least[root, 0] = 0.0
+    tour.least[root, 1] = -total
     for p in range(count - 1, 0, -1):
-        c, d = order[p], order[p + 1 if p + 1 < count else 0]
+        c = order[p]
+        d = order[p + 1 if p + 1 < count else 0]
         _from(tour, False, d, c, tour.out)
         for v in range(tour.size[c]):
             tour.behind[c, v] = tour.out[v]
@@ -124,14 +128,16 @@ def _note_least(tour: Layers, c: int) -> None:
     for v in range(tour.size[c]):
         ahead = min(ahead, tour.ahead[c, v])
         behind = min(behind, tour.behind[c, v])
-    tour.least[c, 0], tour.least[c, 1] = ahead, behind
+    tour.least[c, 0] = ahead
+    tour.least[c, 1] = behind
 
 
 @kernel(inline=True)
 def _from(tour: Layers, forward: bool, a: int, b: int, out: FloatArray) -> None:
     """Fill ``out`` with the values of cluster b from those of cluster a, one way or the other."""
     values = tour.ahead if forward else tour.behind
-    n_at, n_to = tour.size[a], tour.size[b]
+    n_at = tour.size[a]
+    n_to = tour.size[b]
     if n_to < NARROW and n_at > n_to:  # along the rows of the transpose, which lie in a piece
         other = tour.reverse if forward else tour.costs
         pull_values(other, values, a, tour.at[a], n_at, tour.at[b], n_to, out)
@@ -147,11 +153,14 @@ def keep(tour: Layers, c: int, now: int) -> None:
         tour.stamp[c] = now
         tour.touched[0] += 1
         tour.touched[tour.touched[0]] = c
-        tour.old_links[c, 0], tour.old_links[c, 1] = tour.after[c], tour.before[c]
+        tour.old_links[c, 0] = tour.after[c]
+        tour.old_links[c, 1] = tour.before[c]
         tour.old_carry[c] = tour.carry[c]
-        tour.old_least[c, 0], tour.old_least[c, 1] = tour.least[c, 0], tour.least[c, 1]
+        tour.old_least[c, 0] = tour.least[c, 0]
+        tour.old_least[c, 1] = tour.least[c, 1]
         for v in range(tour.size[c]):
-            tour.old_ahead[c, v], tour.old_behind[c, v] = tour.ahead[c, v], tour.behind[c, v]
+            tour.old_ahead[c, v] = tour.ahead[c, v]
+            tour.old_behind[c, v] = tour.behind[c, v]
 
 
 @kernel(inline=True)
@@ -159,22 +168,27 @@ def undo(tour: Layers) -> None:
     """Put back what `keep` has saved in this round."""
     for i in range(1, tour.touched[0] + 1):
         c = tour.touched[i]
-        tour.after[c], tour.before[c] = tour.old_links[c, 0], tour.old_links[c, 1]
+        tour.after[c] = tour.old_links[c, 0]
+        tour.before[c] = tour.old_links[c, 1]
         tour.carry[c] = tour.old_carry[c]
-        tour.least[c, 0], tour.least[c, 1] = tour.old_least[c, 0], tour.old_least[c, 1]
+        tour.least[c, 0] = tour.old_least[c, 0]
+        tour.least[c, 1] = tour.old_least[c, 1]
         for v in range(tour.size[c]):
-            tour.ahead[c, v], tour.behind[c, v] = tour.old_ahead[c, v], tour.old_behind[c, v]
+            tour.ahead[c, v] = tour.old_ahead[c, v]
+            tour.behind[c, v] = tour.old_behind[c, v]
 
 
 @kernel(inline=True)
 def _renew(tour: Layers, forward: bool, c: int, root: int, now: int, tolerance: float) -> None:
     """Renew the values past cluster c in one direction, up to where they are as they were."""
     values, onward = (tour.ahead, tour.after) if forward else (tour.behind, tour.before)
-    p, c = c, onward[c]
+    p = c
+    c = onward[c]
     out = tour.out
     while c != root:
         _from(tour, forward, p, c, out)
-        changed, least = False, np.inf
+        changed = False
+        least = np.inf
         for v in range(tour.size[c]):
             out[v] -= tour.carry[c]
             least = min(least, out[v])
@@ -185,7 +199,8 @@ def _renew(tour: Layers, forward: bool, c: int, root: int, now: int, tolerance: 
         tour.least[c, 0 if forward else 1] = least
         for v in range(tour.size[c]):
             values[c, v] = out[v]
-        p, c = c, onward[c]
+        p = c
+        c = onward[c]
 
 
 @kernel(inline=True)
@@ -209,7 +224,8 @@ def close_gap(
     """Link cluster a to b, what was between them being gone; returns the change of cost."""
     keep(tour, a, now)
     keep(tour, b, now)
-    tour.after[a], tour.before[b] = b, a
+    tour.after[a] = b
+    tour.before[b] = a
     out = tour.out
     _from(tour, True, a, b, out)
     cost = np.inf
@@ -237,14 +253,17 @@ def insertion_cost(tour: Layers, c: int, a: int, b: int, limit: float) -> float:
 
     Infinite where a lower bound says that it is not below the limit.
     """
-    at, size = tour.at[c], tour.size[c]
-    start, end = tour.least[a, 0], tour.least[b, 1]
+    at = tour.at[c]
+    size = tour.size[c]
+    start = tour.least[a, 0]
+    end = tour.least[b, 1]
     bound = np.inf
     for v in range(at, at + size):
         bound = min(bound, tour.into[a, v] + tour.onto[b, v])
     if start + bound + end >= limit:
         return np.inf
-    left, right = tour.left, tour.right
+    left = tour.left
+    right = tour.right
     _from(tour, True, a, c, left)
     bound = np.inf
     for v in range(size):
@@ -265,7 +284,10 @@ def link_in(tour: Layers, c: int, a: int, root: int, now: int, tolerance: float)
     cost = insertion_cost(tour, c, a, b, np.inf)
     keep(tour, a, now)
     keep(tour, b, now)
-    tour.after[a], tour.before[c], tour.after[c], tour.before[b] = c, a, b, c
+    tour.after[a] = c
+    tour.before[c] = a
+    tour.after[c] = b
+    tour.before[b] = c
     tour.carry[c] = cost
     for v in range(tour.size[c]):
         tour.ahead[c, v] = tour.left[v] - cost

@@ -56,7 +56,10 @@ def push_values(
             second = min(second, x + costs[i, j + 1])
             third = min(third, x + costs[i, j + 2])
             fourth = min(fourth, x + costs[i, j + 3])
-        out[w], out[w + 1], out[w + 2], out[w + 3] = first, second, third, fourth
+        out[w] = first
+        out[w + 1] = second
+        out[w + 2] = third
+        out[w + 3] = fourth
 
 
 @kernel(inline=True)
@@ -97,8 +100,10 @@ def best_nodes(
 ) -> float:
     """Fill the cheapest nodes for a closed order of clusters; returns its cost (Fischetti 1997)."""
     # a shortest path through the layers for every node of ``order[0]``, which should be small
-    root, last = order[0], order[count - 1]
-    a, z = offsets[last], offsets[last + 1]
+    root = order[0]
+    last = order[count - 1]
+    a = offsets[last]
+    z = offsets[last + 1]
     best = np.inf
     for node in range(offsets[root], offsets[root + 1]):
         at = offsets[order[1]]
@@ -109,18 +114,22 @@ def best_nodes(
             to = offsets[order[i]]
             n_to = offsets[order[i] + 1] - to
             push_values(costs, layers, i - 1, at, size, to, n_to, layers[i])
-            at, size = to, n_to
-        cost, end = np.inf, -1
+            at = to
+            size = n_to
+        cost = np.inf
+        end = -1
         for v in range(a, z):
             x = layers[count - 1, v - a] + costs[v, node]
             if x < cost:
-                cost, end = x, v
+                cost = x
+                end = v
         if cost < best:
             best = cost
             nodes[0] = node
             nodes[count - 1] = end
             for i in range(count - 1, 1, -1):
-                to, before = nodes[i], offsets[order[i - 1]]
+                to = nodes[i]
+                before = offsets[order[i - 1]]
                 value = layers[i, to - offsets[order[i]]]
                 pick = before
                 for v in range(before, offsets[order[i - 1] + 1]):

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pushplan.gtsp.problem import Problem, tour_cost
-from pushplan.gtsp.walk_kernels import PathProblem, Paths, extend_paths
+from pushplan.gtsp.walk_kernels import Paths, WalkProblem, extend_paths
 from pushplan.gtsp.walks import CHUNK_ARCS, StopFired, Walks
 from pushplan.world.checks import FloatArray, IntArray
 
@@ -60,10 +60,12 @@ def prove(
         try:
             done, nodes = _settle(walks, most)
         except StopFired:
-            done, nodes = False, None
+            done = False
+            nodes = None
         result.paths += walks.paths
         if nodes is not None:
-            result.nodes, limit = nodes, tour_cost(problem.costs, nodes)
+            result.nodes = nodes
+            limit = tour_cost(problem.costs, nodes)
         result.bound = min(result.bound, min(walks.limit, limit) if done else walks.bound)
         result.complete = result.complete and done
         if result.bound == -np.inf:  # it cannot get better
@@ -133,7 +135,7 @@ def cheaper_tour(
     slots = np.empty(1 << int(np.ceil(np.log2(2 * most))), dtype=np.int64)
     step = max(1, CHUNK_ARCS // (4 * walks.count * walks.width))
     for within in walks.walks[-2::-1]:
-        problem = PathProblem(within, costs, walks.known, walks.prices, sizes, walks.limit)
+        problem = WalkProblem(within, costs, walks.known, walks.prices, sizes, walks.limit)
         longer = Paths._make(np.empty(most, dtype=part.dtype) for part in paths)
         found = 0
         slots[:] = -1
@@ -149,7 +151,8 @@ def cheaper_tour(
     totals = paths.values + walks.last.ravel()[paths.ends]
     if not totals.min(initial=np.inf) < walks.limit:
         return True, None
-    at, chosen = int(totals.argmin()), [walks.node]
+    at = int(totals.argmin())
+    chosen = [walks.node]
     for ends, parents in reversed(trail):
         chosen.insert(1, names.ravel()[ends[at]])
         at = int(parents[at])

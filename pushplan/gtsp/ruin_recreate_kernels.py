@@ -41,7 +41,8 @@ def _ruin(
     # Christiaens and Vanden Berghe 2020
     longest = 1 + below(state, target)
     seed = below(state, len(gone))
-    found, change = 0, 0.0
+    found = 0
+    change = 0.0
     for index in range(near.shape[1] + 1):
         c = seed if index == 0 else near[seed, index - 1]
         if found >= target:
@@ -52,7 +53,8 @@ def _ruin(
         for _ in range(below(state, length)):
             if tour.before[c] != root:
                 c = tour.before[c]
-        a, carried = tour.before[c], 0.0
+        a = tour.before[c]
+        carried = 0.0
         while length > 0 and c != root:
             keep(tour, c, now)
             carried += tour.carry[c]
@@ -79,7 +81,8 @@ def _bring_forward(
     farthest: bool,
 ) -> None:
     """Put the removed cluster that is farthest from the tour, or nearest to it, next in turn."""
-    best, pick = -1.0, low
+    best = -1.0
+    pick = low
     for i in range(low, high):
         c = removed[i]
         away = np.inf
@@ -88,7 +91,8 @@ def _bring_forward(
                 away = between[c, index]
                 break
         if best < 0.0 or (away > best if farthest else away < best):
-            best, pick = away, i
+            best = away
+            pick = i
     removed[low], removed[pick] = removed[pick], removed[low]
 
 
@@ -104,7 +108,8 @@ def _cheapest_place(
     state: IntArray,
 ) -> int:
     """Behind which cluster c is cheapest, next to one of its neighbours; a few are overlooked."""
-    lowest, place = np.inf, root
+    lowest = np.inf
+    place = root
     interval = int(2.0 / blink) if blink > 0.0 else 0
     skip = below(state, interval) if interval else -1
     seen[-1] += 1
@@ -123,7 +128,8 @@ def _cheapest_place(
         skip -= 1
         cost = insertion_cost(tour, c, a, tour.after[a], lowest)
         if cost < lowest:
-            lowest, place = cost, a
+            lowest = cost
+            place = a
     return place
 
 
@@ -185,11 +191,14 @@ def search_tours(
         symmetric,
     ) = problem
     current, current_nodes, best, best_choice, values, slack, state = found
-    count, root = len(offsets) - 1, current[0]
+    count = len(offsets) - 1
+    root = current[0]
     tour = make_layers(costs, reverse, into, onto, offsets, root)
     layers = np.empty((count, tour.ahead.shape[1] + SPARE))
-    order, nodes = np.empty(count, np.int64), np.empty(count, np.int64)
-    removed, gone = np.empty(count, np.int64), np.zeros(count, np.int64)
+    order = np.empty(count, np.int64)
+    nodes = np.empty(count, np.int64)
+    removed = np.empty(count, np.int64)
+    gone = np.zeros(count, np.int64)
     seen = np.zeros(count + 1, np.int64)
     values[0] = build(tour, current, current_nodes[0])
     for now in range(rounds):

@@ -75,7 +75,8 @@ class AnytimeSearch:
         seed: IntArray,  # (1,) uint64 of the random numbers; changed
         budget: Budget,  # of the call
     ) -> None:
-        self.config, self.budget = config, budget
+        self.config = config
+        self.budget = budget
         self.floor = problem.floor
         fraction = max(4, int(config.removed_fraction * problem.count))
         self.max_removed = max(1, min(config.max_removed, fraction, problem.count - 2))
@@ -122,12 +123,19 @@ class AnytimeSearch:
         again: bool = False,  # from the best order, not as hot
     ) -> None:
         """One annealing until it is frozen, from a random order or again from the best one."""
-        config, budget, values = self.config, self.budget, self.tour.values
-        lowest, frozen, first = np.inf, 0.0, not again
-        hot, cold = config.hot, config.cold
+        config = self.config
+        budget = self.budget
+        values = self.tour.values
+        lowest = np.inf
+        frozen = 0.0
+        first = not again
+        hot = config.hot
+        cold = config.cold
         if again:
-            self.tour.current[:], self.tour.current_nodes[:] = self.tour.best, self.tour.best_nodes
-            hot, cold = config.reheat * self.best_heat, 0.5 * config.frozen * self.best_heat
+            self.tour.current[:] = self.tour.best
+            self.tour.current_nodes[:] = self.tour.best_nodes
+            hot = config.reheat * self.best_heat
+            cold = 0.5 * config.frozen * self.best_heat
         else:
             self._random_start()
         while not budget.stopped():
@@ -144,7 +152,8 @@ class AnytimeSearch:
                 self.best_heat = heat
             first = False
             if values[0] < lowest - 1e-9 * abs(values[0]):  # not by rounding alone
-                lowest, frozen = values[0], config.frozen * heat
+                lowest = values[0]
+                frozen = config.frozen * heat
             elif heat < frozen:
                 break
 
@@ -153,8 +162,11 @@ class AnytimeSearch:
 
         Only where clusters are wide, enough is known, and setting up anew fits into the budget.
         """
-        config, problem, tour = self.config, self.problem, self.tour
-        nodes, sizes = len(problem.names), np.diff(problem.offsets)
+        config = self.config
+        problem = self.problem
+        tour = self.tour
+        nodes = len(problem.names)
+        sizes = np.diff(problem.offsets)
         if (
             float(sizes @ sizes) < config.narrow_from * nodes
             or self.budget.used < NARROW_ROUNDS
@@ -193,7 +205,9 @@ class AnytimeSearch:
         return float(spread) if np.isfinite(spread) else 0.0
 
     def _rounds(self, temperature: float) -> None:
-        config, budget, values = self.config, self.budget, self.tour.values
+        config = self.config
+        budget = self.budget
+        values = self.tour.values
         rounds = int(min(max(config.chunk_s / self.pace, 1.0), MOST_ROUNDS))
         if budget.rounds < np.inf:  # the same pieces on every machine
             rounds = max(1, int(min(100, budget.rounds // 200, budget.rounds - budget.used)))
@@ -209,7 +223,8 @@ class AnytimeSearch:
             self.budget.note(tour_cost(self.problem.costs, self.tour.best_nodes))
 
     def _random_start(self) -> None:
-        problem, tour = self.problem, self.tour
+        problem = self.problem
+        tour = self.tour
         rng = np.random.default_rng(int(tour.random[0]) + self.budget.used)
         tour.current[1:] = rng.permutation(np.delete(np.arange(problem.count), tour.current[0]))
         layers = np.empty((problem.count, problem.width + SPARE))
@@ -223,7 +238,8 @@ class AnytimeSearch:
         )
         if tour.values[0] < tour.values[1]:
             tour.values[1] = tour.values[0]
-            tour.best[:], tour.best_nodes[:] = tour.current, tour.current_nodes
+            tour.best[:] = tour.current
+            tour.best_nodes[:] = tour.current_nodes
             self._note_best()
 
 
@@ -236,7 +252,9 @@ def search(
     """
     state = AnytimeSearch(problem, config, seed, budget)
     length = max(fraction - budget.gone(), 1e-9) / state.runs_in(fraction)
-    left, whole, runs = fraction, 0.0, 0
+    left = fraction
+    whole = 0.0
+    runs = 0
     while runs == 0 or (left > 0.0 and not budget.stopped()):
         begin = min(budget.gone(), fraction)
         left = fraction - begin
@@ -244,5 +262,6 @@ def search(
         state.run(begin, begin + left / max(1, round(left / length)), again)
         left = fraction - budget.gone()
         if not again:  # it may have ended early
-            whole, runs = whole + budget.gone() - begin, runs + 1
+            whole = whole + budget.gone() - begin
+            runs = runs + 1
     return state.tour.best

@@ -33,12 +33,15 @@ def improve_by_swaps(
     """Swap neighbouring segments, and reverse one where costs are symmetric; returns the gain."""
     # a move takes out the arcs after positions i, j and k and links a = order[i] to one of its
     # neighbours, which must be cheaper than the arc that is taken out
-    count, reach = len(order), near.shape[1]
-    place, scratch = np.empty(count, np.int64), np.empty(count, np.int64)
+    count = len(order)
+    reach = near.shape[1]
+    place = np.empty(count, np.int64)
+    scratch = np.empty(count, np.int64)
     for p in range(count):
         place[order[p]] = p
     total = 0.0
-    tries, i = 0, 0
+    tries = 0
+    i = 0
     while tries < count:
         gain = _first_swap(costs, near, order, nodes, place, scratch, i, reach, tolerance)
         if gain == 0.0 and symmetric:
@@ -67,7 +70,8 @@ def _first_swap(
     """Make the first swap after position i that pays; returns its gain, 0 if there is none."""
     count = len(order)
     i1 = i + 1 if i + 1 < count else 0
-    a, a1 = nodes[i], nodes[i1]
+    a = nodes[i]
+    a1 = nodes[i1]
     for first in range(reach):
         j1 = place[near[order[i], first]]
         if j1 == i1:
@@ -76,7 +80,8 @@ def _first_swap(
         if gain1 <= tolerance:
             continue
         j = j1 - 1 if j1 > 0 else count - 1
-        b, b1 = nodes[j], nodes[j1]
+        b = nodes[j]
+        b1 = nodes[j1]
         gain1 += costs[b, b1]
         for second in range(reach):
             k1 = place[near[order[j], second]]
@@ -86,7 +91,8 @@ def _first_swap(
             ahead_i = i - j1 if i >= j1 else i - j1 + count
             if k1 == j1 or ahead_k > ahead_i:
                 continue
-            c, c1 = nodes[k], nodes[k1]
+            c = nodes[k]
+            c1 = nodes[k1]
             if k == i:
                 continue
             gain = gain1 + costs[c, c1] - costs[b, c1] - costs[c, a1]
@@ -103,7 +109,8 @@ def _swap(
     """Exchange the segments (i, j] and (j, k] of a closed tour."""
     count = len(order)
     # sort the three cuts: exchanging two of three segments of a circle is the same for all
-    low, high = min(i, j, k), max(i, j, k)
+    low = min(i, j, k)
+    high = max(i, j, k)
     middle = i + j + k - low - high
     _rotate(order, scratch, low + 1, middle + 1, high + 1)
     _rotate(nodes, scratch, low + 1, middle + 1, high + 1)
@@ -128,7 +135,8 @@ def _first_reversal(
         i1 = i + 1 if i + 1 < count else 0
         i0 = i - 1 if i > 0 else count - 1
         other = i1 if side == 0 else i0
-        a, a1 = nodes[i], nodes[other]
+        a = nodes[i]
+        a1 = nodes[other]
         for first in range(reach):
             j = place[near[order[i], first]]
             gain = costs[a, a1] - costs[a, nodes[j]]
@@ -143,14 +151,18 @@ def _first_reversal(
             gain += costs[nodes[j], nodes[partner]] - costs[a1, nodes[partner]]
             if gain > tolerance:
                 if side == 0:
-                    low, high = min(i, j) + 1, max(i, j)
+                    low = min(i, j) + 1
+                    high = max(i, j)
                 else:
-                    low, high = min(i, j), max(i, j) - 1
+                    low = min(i, j)
+                    high = max(i, j) - 1
                 while low < high:
                     order[low], order[high] = order[high], order[low]
                     nodes[low], nodes[high] = nodes[high], nodes[low]
-                    place[order[low]], place[order[high]] = low, high
-                    low, high = low + 1, high - 1
+                    place[order[low]] = low
+                    place[order[high]] = high
+                    low = low + 1
+                    high = high - 1
                 if low == high:
                     place[order[low]] = low
                 return float(gain)

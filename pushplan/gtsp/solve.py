@@ -96,7 +96,8 @@ class _SolverCall:
 
     def solve(self) -> Tour:
         """Choose a method and run it."""
-        config, budget = self.config, self.budget
+        config = self.config
+        budget = self.budget
         if len(self.members) == 1:
             return self._tour(self.members[0][:1], proven=True)
         if budget.stopped():
@@ -118,7 +119,8 @@ class _SolverCall:
         problem = Problem.build(self.costs, kept).reduced()
         if self._goes_exact(problem):
             alone = config.method == "exact" or problem.count <= 3
-            self.method, until = "exact", EXACT_FRACTION * budget.seconds
+            self.method = "exact"
+            until = EXACT_FRACTION * budget.seconds
             complete, nodes = solve_exactly(
                 problem,
                 lambda: budget.stopped() or (budget.elapsed > until and config.method != "exact"),
@@ -131,7 +133,9 @@ class _SolverCall:
         return self._search(problem)
 
     def _goes_exact(self, problem: Problem) -> bool:
-        config, budget, need = self.config, self.budget, table_mb(problem)
+        config = self.config
+        budget = self.budget
+        need = table_mb(problem)
         if config.method == "exact" and need > config.memory_mb:
             raise InvalidInputError(
                 f"method 'exact' needs a table of {need:.3g} MB for {problem.count} clusters "
@@ -148,7 +152,8 @@ class _SolverCall:
     def _search(self, problem: Problem, everything: list[IntArray] | None = None) -> Tour:
         """Search, then choose among all nodes of each cluster for the order that was found."""
         self.method = "search"
-        config, budget = self.config, self.budget
+        config = self.config
+        budget = self.budget
         prove_it = config.lower_bound and everything is None
         timed = prove_it and budget.seconds < math.inf
         order = search(
@@ -159,7 +164,8 @@ class _SolverCall:
             return self._tour(nodes)
         members = problem.members
         nodes = best_choice(problem.costs, [members[c] for c in order])
-        cost, bound = tour_cost(problem.costs, nodes), problem.floor
+        cost = tour_cost(problem.costs, nodes)
+        bound = problem.floor
         late = budget.elapsed + PROOF_SETUP_S * len(problem.names) ** 2 > budget.seconds
         if not prove_it or late or budget.check(0, cost):
             return self._tour(problem.names[nodes], bound)
@@ -177,7 +183,8 @@ class _SolverCall:
         if cost == math.inf:
             return self._failed()
         self.budget.note(cost)
-        order, begin = nodes.tolist(), set(self.members[0].tolist())
+        order = nodes.tolist()
+        begin = set(self.members[0].tolist())
         first = next(place for place, node in enumerate(order) if node in begin)
         return Tour(
             (*order[first:], *order[:first]),

@@ -54,22 +54,31 @@ def read_visits(
     visits: IntArray,  # (n,) filled with how often it comes to each cluster
 ) -> float:
     """Cost less prices of the cheapest walk from the root through n nodes and back; its visits."""
-    count, memories = walks.shape[1], walks.shape[2]
+    count = walks.shape[1]
+    memories = walks.shape[2]
     visits[:] = 0
     best = np.inf
-    d, at, i = -1, 0, 0
-    next_d, next_at, next_i = 0, 0, 0
+    d = -1
+    at = 0
+    i = 0
+    next_d = 0
+    next_at = 0
+    next_i = 0
     for e in range(count):
         for memory in range(memories):
             for j in range(sizes[e]):
                 x = walks[count - 1, e, memory, j] - prices[e] + first[e, j]
                 if x < best:
-                    best, d, at, i = x, e, memory, j
+                    best = x
+                    d = e
+                    at = memory
+                    i = j
     if d < 0:
         return best
     visits[d] = 1
     for k in range(count - 1, 0, -1):
-        value, found = walks[k, d, at, i], False
+        value = walks[k, d, at, i]
+        found = False
         for e in range(count):
             for memory in range(memories):
                 if found or moves[d, e, memory] != at:
@@ -79,17 +88,21 @@ def read_visits(
                         walks[k - 1, e, memory, j] - prices[e] + blocks[e, j, d, i] == value
                     ):
                         found = True
-                        next_d, next_at, next_i = e, memory, j
+                        next_d = e
+                        next_at = memory
+                        next_i = j
             if found:
                 break
         if not found:
             break
-        d, at, i = next_d, next_at, next_i
+        d = next_d
+        at = next_at
+        i = next_i
         visits[d] += 1
     return best
 
 
-class PathProblem(NamedTuple):
+class WalkProblem(NamedTuple):
     """Input of the bounds on paths of one length."""
 
     within: FloatArray  # (n, 2^b, K) walks to the root from the new node, by `Walks.allow_memories`
@@ -112,7 +125,7 @@ class Paths(NamedTuple):
 
 @kernel
 def extend_paths(
-    problem: PathProblem,
+    problem: WalkProblem,
     paths: Paths,
     low: int,
     high: int,
@@ -127,7 +140,8 @@ def extend_paths(
     count, memories, width = within.shape
     mask = len(slots) - 1
     for p in range(low, high):
-        c, v = ends[p] // width, ends[p] % width
+        c = ends[p] // width
+        v = ends[p] % width
         for d in range(count):
             if (sets[p] >> d) & 1:
                 continue
@@ -135,7 +149,8 @@ def extend_paths(
             for j in range(lists.shape[1]):
                 if (sets[p] >> lists[d, j]) & 1:
                     free &= ~(1 << j)
-            row, hope = costs[c, v, d], within[d, free]
+            row = costs[c, v, d]
+            hope = within[d, free]
             rest = rests[p] - prices[d]
             joined = sets[p] | (1 << d)
             for i in range(sizes[d]):
@@ -157,8 +172,12 @@ def extend_paths(
                     at = found
                     found += 1
                     slots[slot] = at
-                    new_sets[at], new_ends[at] = joined, d * width + i
-                    new_values[at], new_rests[at], parents[at] = value, rest, p
+                    new_sets[at] = joined
+                    new_ends[at] = d * width + i
+                    new_values[at] = value
+                    new_rests[at] = rest
+                    parents[at] = p
                 elif value < new_values[at]:
-                    new_values[at], parents[at] = value, p
+                    new_values[at] = value
+                    parents[at] = p
     return found

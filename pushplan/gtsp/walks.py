@@ -44,11 +44,14 @@ class Walks:
         whole = bool((finite == np.round(finite)).all()) and self.margin < 0.25
         self.goal = limit
         self.limit = limit - (0.5 if whole else self.margin)
-        self.node, self.count, self.lists = node, len(members), lists
+        self.node = node
+        self.count = len(members)
+        self.lists = lists
         self.prices = np.zeros(self.count)
         self.bound = -np.inf
         self.paths = 0  # looked at by `cheaper_tour`
-        self._all, self._stopped = costs, stopped
+        self._all = costs
+        self._stopped = stopped
         self._gather(members)
 
     def _gather(self, members: list[IntArray]) -> None:
@@ -104,8 +107,10 @@ class Walks:
     def ascend(self, steps: int) -> None:
         """Subgradient steps on the prices; leaves the best ones, and a table to be filled."""
         visits = np.zeros(self.count, dtype=np.int64)
-        best, top = self.prices, -np.inf
-        scale, since = 1.0, 0
+        best = self.prices
+        top = -np.inf
+        scale = 1.0
+        since = 0
         for _ in range(steps):
             self.fill()
             cost = read_visits(
@@ -121,9 +126,13 @@ class Walks:
             self.bound = max(self.bound, value)
             since += 1
             if value > top:
-                top, best, since = value, self.prices, 0
+                top = value
+                best = self.prices
+                since = 0
             if since >= 4:
-                scale, since, self.prices = 0.5 * scale, 0, best
+                scale = 0.5 * scale
+                since = 0
+                self.prices = best
             slope = 1.0 - visits
             norm = float(slope @ slope)
             if self.bound > self.limit or norm == 0.0 or not np.isfinite(value):
@@ -141,7 +150,8 @@ class Walks:
             True if every cluster has a node left.
         """
         self.fill()
-        ahead, longer = np.full_like(self.walks[0], np.inf), np.empty_like(self.walks[0])
+        ahead = np.full_like(self.walks[0], np.inf)
+        longer = np.empty_like(self.walks[0])
         ahead[:, 0] = self.first
         through = np.full(self.first.shape, np.inf)  # (n, K)
         for k in range(self.count):

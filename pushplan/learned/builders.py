@@ -83,7 +83,8 @@ def builder_from_dict(data: Mapping[str, Any]) -> ObservationBuilder:
     )
     if math.prod(builder.shape) > GREATEST_SIZE:
         raise InvalidInputError(f"an observation of shape {builder.shape} is too large")
-    shape, dtype = data.get("shape", builder.shape), data.get("dtype")
+    shape = data.get("shape", builder.shape)
+    dtype = data.get("dtype")
     if isinstance(shape, list):
         shape = tuple(shape)
     if shape != builder.shape or dtype not in (None, builder.dtype.name):

@@ -68,7 +68,8 @@ def _of_one(env: Any, repeat: int, training: Mapping[str, Any]) -> Specification
     own = getattr(env, "specification", None)
     if isinstance(own, Specification):
         return replace(own, training={**own.training, **training})
-    task, builder = getattr(env, "task", None), getattr(env, "observation_builder", None)
+    task = getattr(env, "task", None)
+    builder = getattr(env, "observation_builder", None)
     if task is None or builder is None:
         raise InvalidInputError(
             "only environments of pushplan can be described, such as gymnasium.make("

@@ -34,12 +34,16 @@ def cast_rays(
     reach = np.max(out)
     step = 2.0 * np.pi / count
     for k in range(offsets.shape[0] - 1):
-        first, end = offsets[k], offsets[k + 1]
+        first = offsets[k]
+        end = offsets[k + 1]
         for i in range(first, end):
             j = i + 1 if i + 1 < end else first
-            ax, ay = vertices[i, 0] - x, vertices[i, 1] - y
-            bx, by = vertices[j, 0] - x, vertices[j, 1] - y
-            ex, ey = bx - ax, by - ay
+            ax = vertices[i, 0] - x
+            ay = vertices[i, 1] - y
+            bx = vertices[j, 0] - x
+            by = vertices[j, 1] - y
+            ex = bx - ax
+            ey = by - ay
             # most edges are out of reach: (reach + edge)² is at most 2 (reach² + edge²)
             if ax * ax + ay * ay > 2.0 * (reach * reach + ex * ex + ey * ey):
                 continue
@@ -49,7 +53,8 @@ def cast_rays(
             start = int(np.ceil((low - heading) / step - 1e-9))
             last = int(np.floor((low + abs(turn) - heading) / step + 1e-9))
             for n in range(start, last + 1):
-                c, s = np.cos(heading + n * step), np.sin(heading + n * step)
+                c = np.cos(heading + n * step)
+                s = np.sin(heading + n * step)
                 across = c * ey - s * ex
                 if abs(across) < 1e-15:
                     continue
@@ -58,7 +63,8 @@ def cast_rays(
                     out[n % count] = away
 
 
-_GUIDE, _EACH = 10, 9
+_GUIDE = 10
+_EACH = 9
 
 
 @dataclass(frozen=True)
@@ -101,7 +107,8 @@ class FeatureObservation(LimitedVector, CheckedFields):
     def observe(self, world: World) -> NDArray[np.float32]:
         """The vector."""
         x, y, theta = world.robot_pose.tolist()
-        c, s = math.cos(theta), math.sin(theta)
+        c = math.cos(theta)
+        s = math.sin(theta)
         to_body = np.array([[c, -s], [s, c]]) / self.range  # row vectors times this
         out = np.zeros(self.shape)
         out[:2] = c, s
@@ -139,7 +146,9 @@ class FeatureObservation(LimitedVector, CheckedFields):
         out[5:7] = (np.array(outward) * gaps[nearest]) @ to_body
 
     def _nearest(self, rows: FloatArray, world: World, to_body: FloatArray) -> None:
-        poses, radii, goal = world.movables.poses, world.movables.radii, world.goal
+        poses = world.movables.poses
+        radii = world.movables.radii
+        goal = world.goal
         offset = poses[:, :2] - world.robot_pose[:2]
         away = np.hypot(offset[:, 0], offset[:, 1])
         if isinstance(goal, GoalDisc | GoalLine):
@@ -156,7 +165,8 @@ class FeatureObservation(LimitedVector, CheckedFields):
         rows = rows[: len(chosen)]
         turn = 4.0 * (poses[chosen, 2] - world.robot_pose[2])
         rows[:, :2] = offset[chosen] @ to_body
-        rows[:, 2], rows[:, 3] = np.cos(turn), np.sin(turn)
+        rows[:, 2] = np.cos(turn)
+        rows[:, 3] = np.sin(turn)
         rows[:, 4] = radii[chosen] / self.range
         rows[:, 8] = 1.0
 

@@ -61,7 +61,8 @@ def load_policy(source: str, label: str | None = None, **options: Any) -> Networ
     if source.startswith(LEARNED_PREFIXES):
         path = learned_file(source)
     else:
-        path, label = weights_of(source), label or source
+        path = weights_of(source)
+        label = label or source
     if source.startswith("sb3:"):
         from pushplan.learned.sb3_policy import Sb3Policy
 

@@ -16,7 +16,8 @@ from pushplan.observation import ObservationBuilder
 from pushplan.world import InvalidInputError, World
 from pushplan.world.checks import FloatArray, IntArray
 
-_STILL, _STILL_TURN = 0.005, 0.02
+_STILL = 0.005
+_STILL_TURN = 0.02
 """Motion below which nothing has really moved [sides of a map of pixels or heading steps, rad]."""
 _REMEMBERED = 1000
 
@@ -82,7 +83,8 @@ class NetworkPolicy:
         Raises:
             InvalidInputError: naming what the file says and what the environment has.
         """
-        task, spec = getattr(env, "task", None), self.specification
+        task = getattr(env, "task", None)
+        spec = self.specification
         for kind, names, name in (
             ("task", spec.tasks, getattr(task, "name", None)),
             ("preset", spec.presets, getattr(scenario, "preset", None)),
@@ -145,7 +147,8 @@ class NetworkPolicy:
 
     def _decide(self, world: World, seen: NDArray[Any]) -> NDArray[np.float32]:
         """(repeat, n) the next actions."""
-        spec, output = self.specification.action, self._function(seen)
+        spec = self.specification.action
+        output = self._function(seen)
         if spec.output not in CHOOSING:
             return spec.steps(output)
         still = _STILL * (spec.window or spec.step)
@@ -156,7 +159,8 @@ class NetworkPolicy:
         return spec.chosen(choice)
 
     def _check(self, seen: Any) -> None:
-        shape, dtype = self.observation.shape, self.observation.dtype
+        shape = self.observation.shape
+        dtype = self.observation.dtype
         if isinstance(seen, np.ndarray) and seen.shape == shape and seen.dtype == dtype:
             return
         found = f"{getattr(seen, 'dtype', type(seen).__name__)} of shape {np.shape(seen)}"

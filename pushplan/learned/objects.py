@@ -46,7 +46,8 @@ class ObjectPolicy:
             InvalidInputError: naming both sides.
         """
         for name in ("observation_space", "action_space"):
-            mine, theirs = getattr(self.thing, name, None), getattr(env, name, None)
+            mine = getattr(self.thing, name, None)
+            theirs = getattr(env, name, None)
             if mine is None or theirs is None:
                 continue
             if mine.shape != theirs.shape or mine.dtype != theirs.dtype:

@@ -53,7 +53,8 @@ _REFUSED = {
     "inner": "a node holds a graph or a sparse tensor, which are not run here",
     "external": _EXTERNAL,
 }
-_VARINT, _BYTES = 0, 2
+_VARINT = 0
+_BYTES = 2
 _FIXED = {1: 8, 5: 4}
 """Wire types of protobuf with a fixed size: bytes of each."""
 
@@ -125,10 +126,12 @@ def _look_through(kind: str, data: bytes, counts: Counter[str], metadata: dict[s
 
 def _fields(data: bytes) -> Iterator[tuple[int, int | bytes]]:
     """Number and value of each field of a protobuf message."""
-    at, end = 0, len(data)
+    at = 0
+    end = len(data)
     while at < end:
         key, at = _varint(data, at)
-        number, kind = key >> 3, key & 7
+        number = key >> 3
+        kind = key & 7
         if number == 0:
             raise NotOnnxError("it is no ONNX model, or damaged")
         if kind == _VARINT:

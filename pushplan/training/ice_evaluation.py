@@ -50,7 +50,8 @@ def score(
 ) -> PredictionScores:
     """Score a predictor on batches with their truth."""
     predictor.predict(batches[0][0])  # loads and compiles
-    columns, times = [], []
+    columns = []
+    times = []
     around = np.ones((1, 2 * AROUND + 1, 2 * AROUND + 1), dtype=bool)
     for batch, truth in batches:
         began = time.perf_counter()

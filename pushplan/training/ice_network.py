@@ -78,7 +78,8 @@ def train(pairs: IcePairs, config: IceTrainingConfig | None = None) -> tuple[Ice
     losses = []
     network.train()
     for epoch in range(config.epochs):
-        began, total = time.perf_counter(), 0.0
+        began = time.perf_counter()
+        total = 0.0
         order = torch.randperm(len(pairs), generator=generator)
         for step in range(steps):
             chosen = order[step * config.batch : (step + 1) * config.batch]
@@ -98,10 +99,12 @@ def train(pairs: IcePairs, config: IceTrainingConfig | None = None) -> tuple[Ice
 
 def _loss(network: IceUNet, chosen: list[Any], mirrored: bool, map_weight: float) -> Any:
     """Error of a step: occupancy and work, of patches seen in a mirror or not."""
-    patches, after = chosen[0].float() / LEVELS, chosen[1].float() / LEVELS
+    patches = chosen[0].float() / LEVELS
+    after = chosen[1].float() / LEVELS
     work = chosen[2] / CELLS_PER_LENGTH**3
     if mirrored:
-        patches, after = patches.flip(-1), after.flip(-1)
+        patches = patches.flip(-1)
+        after = after.flip(-1)
     found, effort = network(patches)
     occupancy = ((found - after) ** 2).mean()
     return map_weight * occupancy + (effort - work * (effort + 1e-6).log()).mean()

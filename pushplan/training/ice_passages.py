@@ -25,7 +25,8 @@ from pushplan.world.checks import FloatArray, number
 SPLITS = ("train", "held-out")
 
 
-SHORTEST, LONGEST = 0.2, 1.2
+SHORTEST = 0.2
+LONGEST = 1.2
 """Length of a passage, in hull lengths."""
 ARCS = (0.15, 1.0)
 """Least and greatest length of the arcs that a voyage is made of, in hull lengths."""
@@ -127,7 +128,8 @@ def _choose(
     """Pieces of a voyage, from the poses with the first number to those with the second."""
     last = len(voyage) - 1 if moved.jammed_at < 0 else moved.jammed_at - 1
     shortest, longest = (max(1, round(fraction / SPACING)) for fraction in (SHORTEST, LONGEST))
-    passages, ends = [], []
+    passages = []
+    ends = []
     for _ in range(config.passages):
         count = int(rng.integers(shortest, longest + 1))
         first = int(rng.integers(0, max(1, last - count + 1)))

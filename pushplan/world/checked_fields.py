@@ -124,7 +124,8 @@ def _check(base: Any, note: Any) -> Callable[..., Any] | None:
         return partial(choice, valid=note.valid)
     if isinstance(note, Each):
         entry, *others = get_args(base)
-        least, most = note.least, math.inf
+        least = note.least
+        most = math.inf
         if others != [Ellipsis]:
             least = most = 1 + len(others)
         return partial(_entries, kind=entry, check=_check(entry, note.rule), least=least, most=most)

@@ -105,7 +105,8 @@ def add_superstructure(spec: Any, robot: RobotModel, solids: Solids) -> None:
     step = 0.3 * half  # height of a storey
     add_prism(spec, body, "shell deck", deck, top, top + 0.05 * step, "deck")
     for n, (rear, front, wide, low, high, kind) in enumerate(_HOUSES):
-        (x0, x1) = (stern + rear * length, stern + front * length)
+        x0 = stern + rear * length
+        x1 = stern + front * length
         y = wide * half
         outline = np.array([(x0, -y), (x1, -y), (x1, y), (x0, y)])
         heights = (top + low * step, top + high * step)

@@ -39,7 +39,8 @@ class Imitator:
         self.device = device
         self.pairs, self.held_out = demonstrations(config, data, options.held_out)
         torch.manual_seed(chunk_seed(config.seed, 0))
-        shape, outputs = env.observation_space.shape, env.action.shape
+        shape = env.observation_space.shape
+        outputs = env.action.shape
         network: Any = (
             FlowPolicy(shape, options.widths, outputs, options.euler)
             if isinstance(options, FlowOptions)
@@ -87,7 +88,8 @@ class Imitator:
 
     def _error(self) -> float:
         """Root mean squared error of the outputs that count, held out."""
-        total, count = 0.0, 0.0
+        total = 0.0
+        count = 0.0
         self.policy.eval()
         with torch.no_grad():
             for i in range(0, len(self.held_out.seen), 1024):

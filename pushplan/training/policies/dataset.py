@@ -156,11 +156,14 @@ def _run(
     rng = stream(seed, "noise")
     observed = [builder.observe(env.world)]
     rows: list[tuple[Any, ...]] = []
-    held, disturbed, over = 0, np.zeros(0), False
+    held = 0
+    disturbed = np.zeros(0)
+    over = False
     while not over:
         action = env.encode(policy.act(env.world, seen))
         if held == 0 and noise and rng.random() < noise:
-            held, disturbed = hold, rng.uniform(-1.0, 1.0, action.shape)
+            held = hold
+            disturbed = rng.uniform(-1.0, 1.0, action.shape)
             if driver is not None:
                 driver.reset(env.world, stream(seed, "driver"))
         executed: NDArray[Any] = action

@@ -70,7 +70,8 @@ def demonstrations(
 
 
 def _of_episode(config: TrainingConfig, episode: EpisodeData) -> Demonstrations:
-    seen, wanted = episode.observations[:-1], episode.actions
+    seen = episode.observations[:-1]
+    wanted = episode.actions
     if config.action.output == "chunk":
         return Demonstrations(seen, *action_chunks(wanted, episode.executed, config.action.horizon))
     if config.action.output == "direction":

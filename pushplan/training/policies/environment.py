@@ -30,8 +30,10 @@ class _Blank:
     """In place of a builder: steps between two decisions need not be observed."""
 
     def __init__(self, builder: ObservationBuilder) -> None:
-        self.shape, self.dtype = builder.shape, builder.dtype
-        self.low, self.high = builder.low, builder.high
+        self.shape = builder.shape
+        self.dtype = builder.dtype
+        self.low = builder.low
+        self.high = builder.high
         self._nothing = np.zeros(self.shape, self.dtype)
 
     def observe(self, world: World) -> NDArray[Any]:
@@ -161,7 +163,8 @@ class TrainingEnv(gymnasium.Env[NDArray[Any], Any]):
 
 def action_spec(config: TrainingConfig, env: PushEnv) -> ActionSpec:
     """Return the meaning of the network's output in an environment."""
-    output, mode = config.action.output, config.action.mode
+    output = config.action.output
+    mode = config.action.mode
     shapes = {"direction": (2,), "chunk": (config.action.horizon, MODES[mode])}
     shape: tuple[int, ...] = shapes.get(output, (MODES[mode],))
     if output == "pixel_values":

@@ -35,7 +35,8 @@ def export(network: Any, specification: Specification, path: str | Path) -> Path
         InvalidInputError: if ONNX Runtime gives something else than PyTorch.
         MissingDependencyError: without PyTorch or onnx.
     """
-    torch, onnx = need("torch"), need("onnx")
+    torch = need("torch")
+    onnx = need("onnx")
     path = Path(path)
     network = network.to("cpu").eval()
     inputs = tuple(map(torch.from_numpy, _inputs(network, specification, 2)))
@@ -44,7 +45,8 @@ def export(network: Any, specification: Specification, path: str | Path) -> Path
     model = onnx.load(str(path))
     del model.metadata_props[:]
     entry = model.metadata_props.add()
-    entry.key, entry.value = METADATA_KEY, specification.to_json()
+    entry.key = METADATA_KEY
+    entry.value = specification.to_json()
     model.producer_version = ""
     onnx.save(model, str(path))
     policy = OnnxPolicy(path)

@@ -31,7 +31,8 @@ class FlowPolicy(nn.Module):
         self, shape: tuple[int, ...], widths: Sequence[int], chunk: tuple[int, ...], euler: int
     ) -> None:
         super().__init__()
-        self.chunk, self.euler = chunk, euler
+        self.chunk = chunk
+        self.euler = euler
         self.encoder = Encoder(shape)
         size = math.prod(chunk)
         self.noise = (size,)

@@ -138,7 +138,8 @@ class SpatialActionDqn(DQN):
         self, learning_starts: int, action_noise: Any = None, n_envs: int = 1
     ) -> tuple[NDArray[Any], NDArray[Any]]:
         """The best pixels by the network that learns, or random ones as often as is due now."""
-        rng, seen = self.action_space.np_random, self._last_obs
+        rng = self.action_space.np_random
+        seen = self._last_obs
         assert isinstance(seen, np.ndarray)
         chance = self.exploration_schedule(1.0 - self.num_timesteps / self.config.steps)
         if self.num_timesteps < learning_starts and not self.options.start:
@@ -161,16 +162,20 @@ class SpatialActionDqn(DQN):
 
     def train(self, gradient_steps: int, batch_size: int = 100) -> None:
         """Take gradient steps on decisions drawn from the replay buffer."""
-        options, memory = self.options, self.replay_buffer
+        options = self.options
+        memory = self.replay_buffer
         assert memory is not None
         self._update_learning_rate(self.policy.optimizer)
         losses = []
         for _ in range(gradient_steps):
             drawn = memory.sample(batch_size)
-            seen, actions, following = drawn.observations, drawn.actions, drawn.next_observations
+            seen = drawn.observations
+            actions = drawn.actions
+            following = drawn.next_observations
             if options.mirror and self.action_space.np_random.random() < 0.5:
                 cols = seen.shape[-1]
-                seen, following = seen.flip(-1), following.flip(-1)
+                seen = seen.flip(-1)
+                following = following.flip(-1)
                 actions = actions + cols - 1 - 2 * (actions % cols)  # what is left is right
             discounts = self.gamma if drawn.discounts is None else drawn.discounts
             with torch.no_grad():

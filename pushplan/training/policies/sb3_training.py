@@ -124,7 +124,8 @@ class Sb3Learner:
 
     def learn(self, steps: range, seed: int) -> Learned:
         """Learn with fresh episodes and generators, and the rate of this part of the training."""
-        model, config = self.model, self.config
+        model = self.model
+        config = self.config
         model.set_random_seed(seed)  # also of the environments, at their next reset
         model.env.seed(seed)
         model._last_obs = None
@@ -171,7 +172,8 @@ class Sb3Learner:
         if self.config.algorithm == "sac":
             state["temperature"] = model.log_ent_coef.detach().cpu()
         if self.buffer is not None:
-            state["position"], state["full"] = int(self.buffer.pos), bool(self.buffer.full)
+            state["position"] = int(self.buffer.pos)
+            state["full"] = bool(self.buffer.full)
             for name in _BUFFER:
                 used = getattr(self.buffer, name)[: self.buffer.size()]
                 state[name] = torch.from_numpy(used)
@@ -186,7 +188,8 @@ class Sb3Learner:
         if self.config.algorithm == "sac":
             model.log_ent_coef.data.copy_(state["temperature"])
         if self.buffer is not None:
-            self.buffer.pos, self.buffer.full = int(state["position"]), bool(state["full"])
+            self.buffer.pos = int(state["position"])
+            self.buffer.full = bool(state["full"])
             for name in _BUFFER:
                 values = state[name].numpy()
                 getattr(self.buffer, name)[: len(values)] = values

@@ -131,7 +131,8 @@ def _draw(run: TrainingRun) -> None:
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    points, algorithm = run.curve, run.config.algorithm
+    points = run.curve
+    algorithm = run.config.algorithm
     if not points:
         return
     with rc_context(STYLE):

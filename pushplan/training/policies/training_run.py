@@ -24,8 +24,13 @@ from pushplan.training.policies.config import TrainingConfig, read_config
 from pushplan.training.policies.environment import TrainingEnv
 from pushplan.world import InvalidInputError
 
-CONFIG, CURVE, PICTURE = "config.yaml", "curve.csv", "curve.png"
-CHECKPOINT, BEST, POLICY, RECORD = "checkpoint.pt", "best.pt", "policy.onnx", "training.json"
+CONFIG = "config.yaml"
+CURVE = "curve.csv"
+PICTURE = "curve.png"
+CHECKPOINT = "checkpoint.pt"
+BEST = "best.pt"
+POLICY = "policy.onnx"
+RECORD = "training.json"
 MODEL = "model.zip"
 _ON_BOARD = ("train_return", "valid_return", "valid_share", "valid_success", "loss")
 """Columns of the learning curve that TensorBoard shows."""
@@ -281,10 +286,13 @@ def validate(
         decide: from observation to action.
         episodes: how many; NaN where there is none.
     """
-    returns, successes, fractions = [], [], []
+    returns = []
+    successes = []
+    fractions = []
     for number in range(episodes):
         seen, _ = env.reset(options={"layout": number})
-        total, over = 0.0, False
+        total = 0.0
+        over = False
         while not over:
             seen, reward, terminated, truncated, info = env.step(decide(seen))
             total += reward / env.config.reward_scale
