@@ -27,14 +27,16 @@ def promising(
     """
     score = np.zeros(len(costs))
     for arcs in (costs, costs.T):
-        least = np.full((len(members), len(costs)), np.inf)  # cheapest arc with each cluster
-        for cluster, nodes in enumerate(members):
+        nearest = np.full((NEAREST, len(costs)), np.inf)  # cheapest arcs with clusters, ascending
+        for nodes in members:
             if stopped():
                 break
-            least[cluster] = arcs[nodes].min(axis=0)
-            least[cluster, nodes] = np.inf
-        some = np.arange(min(NEAREST, len(members)))
-        nearest = np.partition(least, some, axis=0)[some]
+            arc = arcs[nodes].min(axis=0).astype(np.float64)
+            arc[nodes] = np.inf
+            for row in nearest:
+                lower = np.minimum(row, arc)
+                arc = np.maximum(row, arc)
+                row[:] = lower
         total = np.where(np.isfinite(nearest), nearest, 0.0).sum(axis=0)
         score += np.where(np.isfinite(nearest[0]), total, np.inf)
     each = max(1, most // len(members))
