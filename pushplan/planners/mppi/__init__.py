@@ -1,7 +1,9 @@
 """Sampling-based predictive control: path integral control and the cross-entropy method."""
 
+from pushplan.planners.mppi.costs import RolloutCost
 from pushplan.planners.mppi.mppi import Decision, Mppi
 from pushplan.planners.mppi.mppi_config import MppiConfig
 from pushplan.planners.mppi.mppi_policy import MppiPolicy
+from pushplan.planners.mppi.rollout_kernels import Rollouts
 
-__all__ = ["Decision", "Mppi", "MppiConfig", "MppiPolicy"]
+__all__ = ["Decision", "Mppi", "MppiConfig", "MppiPolicy", "RolloutCost", "Rollouts"]

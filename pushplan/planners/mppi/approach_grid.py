@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import functools
+from dataclasses import dataclass
 
 import numpy as np
 
 from pushplan.geometry import Grid, clearance_field
-from pushplan.planners.mppi.fields import finite
+from pushplan.planners.mppi.fields import Field, finite
 from pushplan.planners.mppi.mppi_config import MppiConfig
-from pushplan.planners.mppi.rollout_cost_kernels import Approach, Field
 from pushplan.search.grid_dijkstra import grid_dijkstra
 from pushplan.world import StaticMap, World
 from pushplan.world.checks import FloatArray
@@ -25,10 +25,25 @@ _TURNS = np.radians([0.0, 25.0, -25.0, 50.0, -50.0, 75.0, -75.0])
 """Directions of a push that are tried in turn where the robot does not fit behind the object."""
 
 
-def no_approach() -> Approach:
-    """Return the placeholder for no approach."""
-    field = Field(np.zeros((1, 1)), 0.0, 0.0, 1.0)
-    return Approach(-1, field, np.zeros(3), 0.0, 0.0, 0.0)
+@dataclass(frozen=True, eq=False)
+class Approach:
+    """The robot's way to behind the object that is to be pushed.
+
+    Args:
+        target: index of the object.
+        field: of the way to behind it, where it lies now.
+        place: (3,) pose behind it, facing along the push.
+        near: up to here the way is straight, and the heading counts [m].
+        weight: cost of a metre of the way [kg].
+        turned: way that facing away is worth [m].
+    """
+
+    target: int
+    field: Field
+    place: FloatArray
+    near: float
+    weight: float
+    turned: float
 
 
 @functools.lru_cache(maxsize=8)

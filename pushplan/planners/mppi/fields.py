@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import functools
+from typing import NamedTuple
 
 import numpy as np
 
+from pushplan.compiled import kernel, owned
 from pushplan.geometry import GeodesicField, GoalDistances, geodesic_field, goal_distances
+from pushplan.geometry.distance_field import sample_values
 from pushplan.motion.done_places import done_places
-from pushplan.planners.mppi.rollout_cost_kernels import Field
 from pushplan.world import ClearanceArea, Goal, ManipulationGoal, Receptacle, StaticMap
 from pushplan.world.checks import FloatArray, frozen
 
@@ -16,6 +18,31 @@ _INSET = 1.05  # distance of an object's middle from the edges of a receptacle w
 CLEARANCE = 0.7
 """Distance that an object's middle keeps from what is static [r]."""
 _OUTSET = 1.1  # the same from the edge of a clearance area
+
+
+class Field(NamedTuple):
+    """A distance field as kernels read it."""
+
+    values: FloatArray  # (rows, columns) [m], finite
+    x: float  # Least x of the grid [m]
+    y: float  # Least y
+    cell: float  # Side of a cell [m]
+
+
+def sample(field: Field, points: FloatArray) -> FloatArray:
+    """Distances (...) at points (..., 2) [m]."""
+    out = np.empty(points.shape[:-1])
+    _sample(field, owned(points.reshape(-1, 2)), out.reshape(-1))
+    return out
+
+
+@kernel
+def _sample(field: Field, points: FloatArray, out: FloatArray) -> None:
+    """Fill the distances (N,) at points (N, 2) [m]."""
+    for n in range(points.shape[0]):
+        x = points[n, 0]
+        y = points[n, 1]
+        out[n] = sample_values(field.values, field.x, field.y, field.cell, x, y)
 
 
 def finite(values: FloatArray) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,8 +15,8 @@ from pushplan.planners.mppi.control_sequence import (
     least_controls,
     resting,
 )
+from pushplan.planners.mppi.costs import RolloutCost, total_cost
 from pushplan.planners.mppi.mppi_config import MppiConfig
-from pushplan.planners.mppi.objectives import Objective
 from pushplan.planners.mppi.rollout_kernels import Rollouts
 from pushplan.planners.mppi.rollout_model import RolloutModel
 from pushplan.planners.mppi.update_rules import updated
@@ -49,20 +50,24 @@ class Mppi:
     Args:
         config: settings.
         interaction: predicts the objects; see `RolloutModel`.
+        costs: terms that are added to those of the task.
     """
 
     config: MppiConfig = field(default_factory=MppiConfig)
     interaction: InteractionModel | None = None
+    costs: Sequence[RolloutCost] = ()
 
     def __post_init__(self) -> None:
         expect("config", self.config, MppiConfig)
         if self.interaction is not None:
             expect("interaction", self.interaction, InteractionModel)  # type: ignore[type-abstract]
+        for cost in self.costs:
+            expect("costs", cost, RolloutCost)  # type: ignore[type-abstract]
 
     def decide(
         self,
         world: World,
-        objective: Objective,
+        costs: Sequence[RolloutCost],
         nominal: ControlSequence | None = None,
         *,
         stop: Stop | None = None,
@@ -72,7 +77,7 @@ class Mppi:
 
         Args:
             world: the snapshot.
-            objective: costs of rollouts.
+            costs: terms of the task; `Mppi.costs` come on top.
             nominal: controls to begin with, such as the last ones; at rest if None.
             stop: looked at after each iteration; `MppiConfig.iterations` of them if None.
             rng: the only source of randomness.
@@ -80,6 +85,7 @@ class Mppi:
         call = PlanningCall(world, stop, rng)
         config = self.config
         model = RolloutModel(world, config, self.interaction)
+        terms = (*costs, *self.costs)
         if nominal is None:
             nominal = resting(world.robot, config, world.time, model.horizon)
         mean = nominal.later(world.time).knots
@@ -90,23 +96,23 @@ class Mppi:
         done = 0
         for done in range(1, config.iterations + 1):
             samples = draw(call.rng, mean, spread, low, config)
-            costs = objective(model.roll(samples))
-            k = int(np.argmin(costs))
-            if costs[k] < least:
+            totals = total_cost(terms, model.world, model.roll(samples))
+            k = int(np.argmin(totals))
+            if totals[k] < least:
                 best = samples[k]
-                least = float(costs[k])
-            mean, spread = updated(config, samples, costs, spread)
+                least = float(totals[k])
+            mean, spread = updated(config, samples, totals, spread)
             if call.check(done, least):
                 break
         rollouts = model.roll(np.stack([mean, best]))
-        costs = objective(rollouts)
-        chosen = int(np.argmin(costs))
+        totals = total_cost(terms, model.world, rollouts)
+        chosen = int(np.argmin(totals))
         controls = ControlSequence(world.time, model.horizon, (mean, best)[chosen])
         result = call.result(
             PlanStatus.APPROXIMATE,
             _plan(world, model, rollouts, chosen),
             iterations=done,
-            cost=float(costs[chosen]),
+            cost=float(totals[chosen]),
         )
         return Decision(controls, result)
 

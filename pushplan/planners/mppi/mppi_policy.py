@@ -13,13 +13,9 @@ from pushplan.control import EpisodeClock, ImmediateExecutor, waiting_twist
 from pushplan.control.limits import driven_twist, ramp_twist
 from pushplan.planners.arguments import check_pusher
 from pushplan.planners.mppi.control_sequence import SPEED, TURN, ControlSequence
+from pushplan.planners.mppi.costs import RolloutCost, manipulation_costs, navigation_costs
 from pushplan.planners.mppi.mppi import Decision, Mppi
 from pushplan.planners.mppi.mppi_config import MppiConfig
-from pushplan.planners.mppi.objectives import (
-    Objective,
-    manipulation_objective,
-    navigation_objective,
-)
 from pushplan.planners.mppi.rollout_model import step_length
 from pushplan.planners.mppi.target_choice import TargetChoice
 from pushplan.planners.warm_up_worlds import warm_up_worlds
@@ -132,8 +128,8 @@ class MppiPolicy:
         targets = self._targets
 
         def decide(stop: Stop | None) -> Decision:
-            objective = _objective(world, planner.config, targets)
-            return planner.decide(world, objective, nominal, stop=stop, rng=rng)
+            costs = _costs(world, planner.config, targets)
+            return planner.decide(world, costs, nominal, stop=stop, rng=rng)
 
         self._decided_at = world.time
         self._pending = self._executor.submit(decide, world.time, self.stop)
@@ -150,11 +146,11 @@ class MppiPolicy:
         self.current_plan = decision.result.plan
 
 
-def _objective(world: World, config: MppiConfig, targets: TargetChoice) -> Objective:
-    """Return the objective that a decision minimises."""
+def _costs(world: World, config: MppiConfig, targets: TargetChoice) -> list[RolloutCost]:
+    """Return the terms of the task that a decision minimises."""
     if isinstance(world.goal, GoalDisc | GoalLine):
-        return navigation_objective(world, config)
-    return manipulation_objective(world, config, targets.approach(world))
+        return navigation_costs(world, config)
+    return manipulation_costs(world, config, targets.approach(world))
 
 
 @functools.cache

@@ -46,7 +46,7 @@ class RolloutProblem(NamedTuple):
 class Rollouts(NamedTuple):
     """S rollouts of N + 1 poses among K objects."""
 
-    paths: FloatArray  # (S, N + 1, 3) poses of the robot
+    paths: FloatArray  # (S, N + 1, 3) poses of the robot; the last one again after the end
     twists: FloatArray  # (S, H, 2) speed [m/s] and turn rate [rad/s] of each step
     ends: IntArray  # (S,) index of the last pose that is reached
     outcomes: IntArray  # (S,) `DRIVEN`, `REACHED` or `BLOCKED`

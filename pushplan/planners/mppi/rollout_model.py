@@ -102,6 +102,9 @@ class RolloutModel:
             roll_objects(self.compiled, self._objects, rollouts)
         elif len(self._objects):
             self._ask(rollouts)
+        # a path stays where it has ended, so that costs need not know the ends
+        kept = np.minimum(np.arange(rollouts.paths.shape[1]), rollouts.ends[:, None])
+        rollouts.paths[:] = np.take_along_axis(rollouts.paths, kept[..., None], axis=1)
         return rollouts
 
     def _ask(self, rollouts: Rollouts) -> None:

@@ -7,10 +7,9 @@ import math
 import numpy as np
 
 from pushplan.geometry import Path
-from pushplan.planners.mppi.approach_grid import approach_to, no_approach, place_behind
+from pushplan.planners.mppi.approach_grid import Approach, approach_to, place_behind
 from pushplan.planners.mppi.fields import CLEARANCE, object_ways
 from pushplan.planners.mppi.mppi_config import MppiConfig
-from pushplan.planners.mppi.rollout_cost_kernels import Approach
 from pushplan.world import World
 from pushplan.world.checks import FloatArray
 
@@ -34,14 +33,14 @@ class TargetChoice:
         self._best = math.inf
         self._since = 0.0
 
-    def approach(self, world: World) -> Approach:
-        """The way to behind the object that is to be pushed now."""
+    def approach(self, world: World) -> Approach | None:
+        """The way to behind the object that is to be pushed now; None if there is none."""
         movables = world.movables
         completed = world.completed
         ids = movables.ids.tolist()
         left = [k for k in range(len(ids)) if not completed[k]]
         if not left:
-            return no_approach()
+            return None
         if self._target in ids and ids.index(self._target) in left:
             k = ids.index(self._target)
             place = self._behind(world, k)
@@ -50,7 +49,7 @@ class TargetChoice:
             self._failures[self._target] = self._failures.get(self._target, 0) + 1
         found = {k: place for k in left if (place := self._behind(world, k)) is not None}
         if not found:
-            return no_approach()
+            return None
         k = min(
             found, key=lambda k: (self._failures.get(ids[k], 0), _way(world, k, found[k]), ids[k])
         )

@@ -238,3 +238,39 @@ def test_a_crowd_of_objects_with_a_goal_is_kept_whole():
     line = room(walls=False, goal=GoalLine(np.array([8.0, 0.0]), np.array([1.0, 0.0])))
     far = replace(line, movables=crowd, robot_pose=np.array([9.5, 9.5, 0.0]))
     assert len(RolloutModel(far, replace(SMALL, steps=2)).world.movables) == 0
+
+
+def test_a_term_of_a_user_is_added_to_the_cost():
+    """With a price on the right half of the room the robot keeps to the left one."""
+    world = room()
+    asked = []
+
+    def right_half(world, rollouts):
+        asked.append((world, rollouts))
+        return 50.0 * np.maximum(5.0 - rollouts.paths[:, :, 1], 0.0).max(axis=1)
+
+    def plan(*costs):
+        policy = make_policy("mppi", samples=64, costs=costs)
+        policy.reset(world, np.random.default_rng(0))
+        policy.act(world)
+        return policy.current_plan.poses
+
+    assert plan()[:, 1].min() < 4.5
+    assert plan(right_half)[:, 1].min() > 4.9
+    seen, rollouts = asked[0]
+    assert seen.movables == world.movables
+    assert rollouts.objects.shape == (64, 2, 3)
+    ends = rollouts.paths[np.arange(64), rollouts.ends]
+    assert (ends == rollouts.paths[:, -1]).all()
+    nothing = plan(lambda world, rollouts: np.zeros(len(rollouts.paths)))
+    assert nothing.tobytes() == plan().tobytes()
+
+
+@pytest.mark.parametrize(
+    "wrong", [lambda w, r: np.zeros(3), lambda w, r: np.full(len(r.paths), math.nan), "left"]
+)
+def test_terms_that_are_no_costs_are_one_clear_line(wrong):
+    with pytest.raises(InvalidInputError, match="cost"):
+        policy = make_policy("mppi", samples=8, costs=[wrong])
+        policy.reset(room(), np.random.default_rng(0))
+        policy.act(room())
