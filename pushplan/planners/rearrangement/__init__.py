@@ -2,7 +2,7 @@
 
 from pushplan.planners.rearrangement.gtsp_mpc import GtspMpc
 from pushplan.planners.rearrangement.gtsp_policy import Gtsp
-from pushplan.planners.rearrangement.push import Push
+from pushplan.planners.rearrangement.push import Push, PushCost
 from pushplan.planners.rearrangement.push_choice import build_push_graph
 from pushplan.planners.rearrangement.push_graph import PushGraph, push_order
 from pushplan.planners.rearrangement.push_scene import PushScene
@@ -12,6 +12,7 @@ __all__ = [
     "Gtsp",
     "GtspMpc",
     "Push",
+    "PushCost",
     "PushGraph",
     "PushScene",
     "RearrangementConfig",

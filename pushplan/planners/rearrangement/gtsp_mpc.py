@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from pushplan.control import ImmediateExecutor, PoseFollower, Retreat
-from pushplan.planners.rearrangement.push import Push, PushHistory, push_plan, signature
+from pushplan.planners.rearrangement.push import Push, PushCost, PushHistory, push_plan, signature
 from pushplan.planners.rearrangement.push_choice import (
     PendingChoice,
     PushChoice,
@@ -44,6 +45,7 @@ class GtspMpc(RearrangementPolicy):
         config: settings.
         stop: stop rule of each choice, counted in simulated pushes; what was found until then is
             driven. By default ``max_rollouts`` of the config.
+        costs: terms that are added to the cost by which pushes are chosen.
         overrides: fields of the default config to change, in place of ``config``.
 
     Attributes:
@@ -58,6 +60,7 @@ class GtspMpc(RearrangementPolicy):
         config: RearrangementConfig | None = None,
         *,
         stop: Stop | None = None,
+        costs: Sequence[PushCost] = (),
         **overrides: Any,
     ) -> None:
         if config is not None and overrides:
@@ -65,6 +68,9 @@ class GtspMpc(RearrangementPolicy):
         if config is None:
             config = RearrangementConfig.of(**overrides)
         self.stop = None if stop is None else expect("stop", stop, Stop)  # type: ignore[type-abstract]
+        self.costs = tuple(costs)
+        for cost in self.costs:
+            expect("costs", cost, PushCost)  # type: ignore[type-abstract]
         super().__init__(config)
 
     def _forget(self) -> None:
@@ -138,7 +144,9 @@ class GtspMpc(RearrangementPolicy):
                 if self._choosing is None:
                     if searched:  # one search a step is enough
                         break
-                    self._choosing = choose_push(scene, self._history, self._executor, self.stop)
+                    self._choosing = choose_push(
+                        scene, self._history, self._executor, self.stop, self.costs
+                    )
                     searched = True
                 if not self._take_up_choice(scene):
                     break
@@ -169,7 +177,7 @@ class GtspMpc(RearrangementPolicy):
             expected = scene_after(scene, execution.push)
             if not expected.done.all():
                 self._choosing = choose_push(
-                    expected, self._history, self._executor, self.stop, ahead=True
+                    expected, self._history, self._executor, self.stop, self.costs, ahead=True
                 )
 
     def _take_up_choice(self, scene: PushScene) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from dataclasses import dataclass, field
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -73,6 +74,20 @@ class Push(ArrayRecord):
         """(3,) where it ends."""
         end: FloatArray = self.poses[-1]
         return end
+
+
+@runtime_checkable
+class PushCost(Protocol):
+    """A term of the cost by which pushes are chosen."""
+
+    def __call__(self, world: World, push: Push) -> float:
+        """Cost of a push [m], beside those of driving and pushing; inf rules the push out.
+
+        Args:
+            world: the snapshot that the push is chosen for.
+            push: with its prediction.
+        """
+        ...
 
 
 def signature(push: Push) -> tuple[object, ...]:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import copy
 import math
+import numbers
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pushplan.errors import InvalidInputError, short
 from pushplan.motion.recovery_path import recovery_path
 from pushplan.planners.rearrangement.approach import (
     ApproachTree,
@@ -22,7 +24,7 @@ from pushplan.planners.rearrangement.approach import (
 from pushplan.planners.rearrangement.candidates import delivering_pushes, partial_pushes
 from pushplan.planners.rearrangement.goal_kernels import REMOVED
 from pushplan.planners.rearrangement.pose_search_kernels import least_costs
-from pushplan.planners.rearrangement.push import Push, PushHistory
+from pushplan.planners.rearrangement.push import Push, PushCost, PushHistory
 from pushplan.planners.rearrangement.push_graph import PushGraph, sequence_pushes
 from pushplan.planners.rearrangement.push_scene import (
     MARGIN,
@@ -32,7 +34,7 @@ from pushplan.planners.rearrangement.push_scene import (
 )
 from pushplan.planners.rearrangement.push_simulator import resimulate
 from pushplan.planners.rearrangement.relocation import relocating_pushes
-from pushplan.world import PendingResult, PlanningExecutor, Stop
+from pushplan.world import PendingResult, PlanningExecutor, Stop, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import path_length, path_lengths
 from pushplan.world.stop import wants_own_budget
@@ -118,6 +120,7 @@ def choose_push(
     history: PushHistory,
     executor: PlanningExecutor,
     stop: Stop | None,
+    costs: Sequence[PushCost] = (),
     ahead: bool = False,
 ) -> PendingChoice:
     """Ask for the best push, or else a way out of a tight place.
@@ -127,19 +130,21 @@ def choose_push(
         history: what has been tried; it is copied.
         executor: runs the search.
         stop: its stop rule; without one no more pushes than the config allows are simulated.
+        costs: terms of a user, which are added to the cost of a push.
         ahead: whether the scene is still to come.
     """
     history = copy.deepcopy(history)
+
+    def penalty(push: Push) -> float:
+        tried = history.penalty(push, scene.config) * scene.size
+        return tried + sum(_checked(cost, scene.world, push) for cost in costs)
 
     def choose(rule: Stop | None) -> PushChoice:
         assert scene.cache is not None
         scene.cache.age()
         most = scene.config.max_rollouts if wants_own_budget(rule) else math.inf
         budget = SearchBudget(rule, most)
-        choice = select_push(
-            scene.changed(budget=budget),
-            lambda push: history.penalty(push, scene.config) * scene.size,
-        )
+        choice = select_push(scene.changed(budget=budget), penalty)
         margin = 0.5 * MARGIN * scene.size
         return replace(
             choice,
@@ -149,6 +154,16 @@ def choose_push(
         )
 
     return PendingChoice(scene, executor.submit(choose, scene.world.time, stop), ahead)
+
+
+def _checked(cost: PushCost, world: World, push: Push) -> float:
+    """Return what a term of a user says."""
+    found = cost(world, push)
+    if not isinstance(found, numbers.Real) or math.isnan(found) or found == -math.inf:
+        raise InvalidInputError(
+            f"the cost {short(cost)} must give a number above -inf for a push, got {short(found)}"
+        )
+    return float(found)
 
 
 def scene_after(scene: PushScene, push: Push) -> PushScene:

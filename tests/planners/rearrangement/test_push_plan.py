@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from conftest import make_u_maze
 
 from pushplan.envs import make
 from pushplan.planners import make_policy
+from pushplan.planners.rearrangement import GtspMpc
 from pushplan.planners.rearrangement.goal_kernels import REMOVED
 from pushplan.planners.rearrangement.push import Push, push_plan
 from pushplan.scenarios import suite
-from pushplan.world import ShowsPlan
+from pushplan.world import InvalidInputError, ShowsPlan, World
 
 
 @pytest.mark.warm("gtsp-mpc")
@@ -61,3 +64,36 @@ def test_an_object_that_leaves_ends_in_front_of_the_robot() -> None:
     front, size = world.robot.vertices[:, 0].max(), world.movables.radii[0]
     assert y == 9.0 and 0.5 * size < x - (8.0 + front) < size
     assert np.allclose(plan.object_poses[-1, 1], world.movables.poses[1])
+
+
+def _first_choice(*costs: object) -> GtspMpc:
+    (scenario,) = suite("area-clearing-2d-10", episodes=1, first_seed=3).scenarios
+    env = make(scenario, action="velocity")
+    env.reset(seed=scenario.seed)
+    policy = make_policy("gtsp-mpc", costs=costs)
+    policy.reset(env.world, np.random.default_rng(0))
+    policy.act(env.world, None)
+    return policy
+
+
+@pytest.mark.warm("gtsp-mpc")
+def test_a_term_of_a_user_changes_the_choice_of_pushes() -> None:
+    plain = _first_choice()
+    first = plain.plan[0].delivers
+    seen = []
+
+    def not_these(world: World, push: Push) -> float:
+        seen.append(len(world.movables))
+        return math.inf if set(push.serves) & set(first) else 0.0
+
+    assert not set(_first_choice(not_these).plan[0].serves) & set(first)
+    assert set(seen) == {10}
+    same = _first_choice(lambda world, push: 0.0)
+    assert [push.delivers for push in same.plan] == [push.delivers for push in plain.plan]
+
+
+@pytest.mark.warm("gtsp-mpc")
+@pytest.mark.parametrize("wrong", ["cheap", lambda world, push: "1", lambda world, push: math.nan])
+def test_terms_that_are_no_costs_are_one_clear_line(wrong: object) -> None:
+    with pytest.raises(InvalidInputError, match="cost"):
+        _first_choice(wrong)
