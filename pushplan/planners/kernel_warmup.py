@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import math
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -12,7 +13,6 @@ from pushplan.control import waiting_twist
 from pushplan.control.recovery import warm_up_recovery
 from pushplan.motion.path_search_config import PathSearchConfig
 from pushplan.planners.following.plan_follower import PlanFollower
-from pushplan.planners.following.renewing_follower import RenewingFollower
 from pushplan.planners.registry import make_policy, policy_names
 from pushplan.planners.warm_up_worlds import warm_up_worlds
 from pushplan.world import MaxIterations, Policy, World
@@ -91,5 +91,5 @@ def _plan_and_follow(policy: PlanFollower, world: World) -> None:
         planner.plan(moved, stop=fewer)
         policy.act(moved)
         waiting_twist(moved)
-    if isinstance(policy, RenewingFollower):  # it compares plans, farther on than this
+    if math.isfinite(policy.replanning.renewal):  # it compares plans, farther on than this
         policy.interaction.sweep(world, np.array(_POSES))

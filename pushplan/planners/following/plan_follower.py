@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -52,6 +53,15 @@ _CLOSED = (PlanStatus.GOAL_UNREACHABLE, PlanStatus.WAY_CLOSED)
 _PAUSE = 0.1  # between two plans, of the time for which the robot has not got on
 
 
+@runtime_checkable
+class PreparedPlanner(Protocol):
+    """A planner that makes what depends on the robot alone before its first call."""
+
+    def prepare(self, world: World) -> None:
+        """Make it; it is kept."""
+        ...
+
+
 @dataclass(frozen=True)
 class _PendingPlan:
     """A planning call whose plan may not be there yet."""
@@ -83,7 +93,8 @@ class PlanFollower:
         controller: drives them; by default `pushplan.control.PathFollower`, but
             `pushplan.control.PurePursuit` where the turn rates of a plan do not give its headings.
         replanning: when to plan again.
-        interaction: predicts what the rest of a plan will do; quasi-static by default.
+        interaction: predicts what the rest of a plan will do, or a function that gives the model
+            for a world; quasi-static by default.
         stop: stop rule of each planning call; the planner's own default if None.
     """
 
@@ -96,13 +107,18 @@ class PlanFollower:
         controller: Controller | None = None,
         *,
         replanning: Replanning | None = None,
-        interaction: InteractionModel | None = None,
+        interaction: InteractionModel | Callable[[World], InteractionModel] | None = None,
         stop: Stop | None = None,
     ) -> None:
         self.planner = planner
         self.controller: Controller = PlanController() if controller is None else controller
         self.replanning = Replanning() if replanning is None else replanning
-        self.interaction = QuasiStatic() if interaction is None else interaction
+        self.interaction: InteractionModel = QuasiStatic()
+        self._model_of: Callable[[World], InteractionModel] | None = None
+        if isinstance(interaction, InteractionModel):
+            self.interaction = interaction
+        else:
+            self._model_of = interaction
         self.stop = stop
         self._begun = False
         self._progress: Progress
@@ -111,6 +127,8 @@ class PlanFollower:
 
     def reset(self, world: World, rng: np.random.Generator) -> None:
         """Forget the last episode; calls run at once until `plan_with` says otherwise."""
+        if isinstance(self.planner, PreparedPlanner):
+            self.planner.prepare(world)
         world = world.with_fixed_as_static()
         self._abandon()
         self._forget(rng)
@@ -158,6 +176,8 @@ class PlanFollower:
         return self._clock.command_for(world, self._act)
 
     def _act(self, world: World) -> Twist:
+        if self._model_of is not None:
+            self.interaction = self._model_of(world)  # open water may get its first obstacle
         wanted = self._choose(world)
         last = self._clock.command
         held = self._clock.held
@@ -320,7 +340,7 @@ class PlanFollower:
         if self._tight and waited >= 4.0 * pause:
             return Reason.TIGHT  # there may be a plan that keeps its distance
         driven = np.hypot(*(world.robot_pose[:2] - planned.robot_pose[:2]))
-        if waited >= rule.every_seconds - 1e-9 or driven >= rule.every_metres:
+        if waited >= rule.every_seconds - 1e-9 or driven >= rule.renewal * size:
             return Reason.PERIOD
         end = None
         if np.isfinite(rule.look_ahead):

@@ -59,7 +59,7 @@ class Replanning(CheckedFields):
             plan that cannot be driven on is replaced anyway. None replaces without comparing.
         push_weight: w; None takes that of the planner's config, or 1 if it has none.
         every_seconds: plan again when the plan is this old [s].
-        every_metres: plan again when the robot is this far from where it planned [m].
+        renewal: plan again when the robot is this far from where it planned [R].
         latency: time for which a planning call takes [s]. A plan then starts where the robot will
             be after it, and is joined to the part of the old plan up to there. None stands for 0
             where plans are there at once, and for what the last calls took in latency-aware
@@ -74,7 +74,7 @@ class Replanning(CheckedFields):
     margin: NonNegativeFloat | None = 0.1
     push_weight: NonNegativeFloat | None = None
     every_seconds: _Endless = math.inf
-    every_metres: _Endless = math.inf
+    renewal: _Endless = math.inf
     latency: NonNegativeFloat | None = None
 
     def weight(self, planner: object) -> float:

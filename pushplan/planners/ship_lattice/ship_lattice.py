@@ -64,8 +64,8 @@ class ShipLattice:
         """Make what depends on the ship alone, which the first call would do otherwise.
 
         That is the motion primitives and what the hull covers along them, 20 to 60 ms; it is kept
-        for all planners of this process. `RenewingFollower` does it
-        at the start of an episode.
+        for all planners of this process. `PlanFollower` does it at the
+        start of an episode.
         """
         radius = turning_radius(world.robot, self.config.turn_fraction)
         LatticeBuilder(world, self.config, radius=radius, side=0.0).build()

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from pushplan.interaction.path_sweepers import default_interaction
 from pushplan.planners.following.plan_follower import PlanFollower
-from pushplan.planners.following.renewing_follower import RenewingFollower
 from pushplan.planners.following.replanning import Replanning
 from pushplan.planners.ship_lattice.ship_lattice import ShipLattice, published, quick
 from pushplan.world import Planner, Stop
@@ -16,8 +16,9 @@ MARGIN = 0.05
 
 def ship_lattice(planner: Planner | None = None, stop: Stop | None = None) -> PlanFollower:
     """The ship lattice with plans renewed while it drives, compared by their predicted cost."""
-    rule = Replanning(surprise=1e9, margin=MARGIN)
-    return RenewingFollower(planner or ShipLattice(), renewal=RENEWAL, replanning=rule, stop=stop)
+    rule = Replanning(surprise=1e9, margin=MARGIN, renewal=RENEWAL)
+    planner = planner or ShipLattice()
+    return PlanFollower(planner, replanning=rule, interaction=default_interaction, stop=stop)
 
 
 def ship_lattice_quick(planner: Planner | None = None, stop: Stop | None = None) -> PlanFollower:

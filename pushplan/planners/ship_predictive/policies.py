@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from pushplan.interaction.path_sweepers import default_interaction
 from pushplan.planners.following.plan_follower import PlanFollower
-from pushplan.planners.following.renewing_follower import RenewingFollower
 from pushplan.planners.following.replanning import Replanning
 from pushplan.planners.ship_predictive import (
     PredictivePublished,
@@ -15,22 +15,20 @@ from pushplan.world import Planner, Stop
 
 def ship_predictive(planner: Planner | None = None, stop: Stop | None = None) -> PlanFollower:
     """Predicts the floes along each path, and looks for a better one about every quarter hull."""
-    return _renewed(planner or PredictiveShip(), 0.6, stop)
+    return _renewed(planner or PredictiveShip(), Replanning(margin=0.01, renewal=0.6), stop)
 
 
 def network(planner: Planner | None = None, stop: Stop | None = None) -> PlanFollower:
     """Predicts the occupancy with a network, and looks for a better path half as often."""
-    return _renewed(planner or PredictiveShipNetwork(), 1.2, stop)
+    rule = Replanning(margin=0.01, renewal=1.2)
+    return _renewed(planner or PredictiveShipNetwork(), rule, stop)
 
 
 def published(planner: Planner | None = None, stop: Stop | None = None) -> PlanFollower:
     """The published search by a network: a new plan every 5 m with a ship of 2 m, and taken."""
-    rule = Replanning(margin=None)
-    return RenewingFollower(
-        planner or PredictivePublished(), renewal=5.0, replanning=rule, stop=stop
-    )
+    rule = Replanning(margin=None, renewal=5.0)
+    return _renewed(planner or PredictivePublished(), rule, stop)
 
 
-def _renewed(planner: Planner, renewal: float, stop: Stop | None) -> PlanFollower:
-    rule = Replanning(margin=0.01)
-    return RenewingFollower(planner, renewal=renewal, replanning=rule, stop=stop)
+def _renewed(planner: Planner, rule: Replanning, stop: Stop | None) -> PlanFollower:
+    return PlanFollower(planner, replanning=rule, interaction=default_interaction, stop=stop)

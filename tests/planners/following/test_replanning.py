@@ -149,9 +149,9 @@ class TestPeriod:
             policy.act(floor(robot_pose=[0.15 * step, 0, 0], time=float(step)))
         assert [world.time for world in planner.asked] == [0.0, 5.0, 10.0]
 
-    def test_every_so_many_metres(self):
+    def test_every_so_many_radii(self):
         planner = Scripted(line_plan)
-        policy = follower(planner, every_metres=0.7)
+        policy = follower(planner, renewal=0.7 / make_robot().circumscribed_radius)
         for step in range(12):
             policy.act(floor(robot_pose=[0.15 * step, 0, 0], time=float(step)))
         assert [world.time for world in planner.asked] == [0.0, 5.0, 10.0]
@@ -379,7 +379,7 @@ def test_urgent_reasons():
         {"margin": -1.0},
         {"push_weight": math.nan},
         {"every_seconds": 0.0},
-        {"every_metres": -1.0},
+        {"renewal": -1.0},
         {"look_ahead": 0.0},
         {"latency": math.inf},
         {"surprise": -1.0},
