@@ -13,7 +13,6 @@ from pushplan.control.pose_follower import PoseFollower
 from pushplan.control.progress_checker import PoseProgressChecker, ProgressChecker, StallChecker
 from pushplan.control.pure_pursuit import PurePursuit
 from pushplan.control.recovery import Recovery
-from pushplan.control.retreat import Retreat
 from pushplan.control.tracking import Progress
 from pushplan.control.waiting import waiting_twist
 from pushplan.imports.on_demand import lazy_names
@@ -35,7 +34,6 @@ __all__ = [
     "ProgressChecker",
     "PurePursuit",
     "Recovery",
-    "Retreat",
     "SimulatedExecutor",
     "StallChecker",
     "TwistLimiter",

@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import functools
+import math
 
 import numpy as np
 
+from pushplan.control.limits import clamp_twist
 from pushplan.control.pose_follower import PoseFollower
-from pushplan.control.retreat import Retreat
+from pushplan.control.progress_checker import StallChecker
 from pushplan.geometry.transforms import arc_step
 from pushplan.motion.collision import footprint, obstacles, static_depth
 from pushplan.motion.recovery_path import recovery_path
 from pushplan.world import Drive, GoalDisc, Movables, StaticMap, Twist, World, box_delivery_robot
 from pushplan.world.checks import FloatArray
 
+_WAYS = ((-1.0, 0.0), (-0.5, 1.0), (-0.5, -1.0), (1.0, 0.0), (0.5, 1.0), (0.5, -1.0))
+"""Speed and turn rate, as fractions of the greatest, that are tried in turn."""
+_PATIENCE = 0.5  # time after which another way is tried where something stops the robot [s]
+_TURNED = 1.0  # a turn by more is as good as the distance [rad]
+_FREED = 0.03  # a way that has moved the robot by less has not freed it [circumscribed radii]
 # distance ahead in which walls are looked for [circumscribed radii], and how often
 _LOOK = 0.3
 _POSES = 3
@@ -21,19 +28,19 @@ _DEEPER = 1e-3  # by how much the robot may get deeper into a wall [circumscribe
 
 
 class Recovery:
-    """Drives back, along a curve or ahead; where no such way is left, along a searched path.
+    """Drives straight back, or whichever way is free; where none is, along a searched path.
 
-    The ways are those of `Retreat`, the path that of `recovery_path`; a car has the ways alone. It
-    ends when the robot has got away, and when nothing is left to try; each part of it ends where
-    something stops the robot.
+    It ends when the robot has got away, and when nothing is left to try; each part of it ends where
+    something stops the robot. The path is that of `recovery_path`; a car has the ways alone.
 
     Args:
         world: where the robot is stuck; a differential drive, or a car that reverses.
-        distance: to get away by [m].
+        distance: to get away by [m]; a turn by 1 rad is as good.
         skip: how many ways to leave to the end, because they have not helped before.
         response: time in which an error from the path is driven off [s].
-        looks: whether ways into what is static are left out. Objects are never looked at:
-            backing away from them is what frees a jam.
+        looks: whether ways into what is static are left out; else a way is tried until something
+            stops the robot. Objects are never looked at: backing away from them frees a jam.
+        searches: whether a path is searched where no way is left.
     """
 
     def __init__(
@@ -44,14 +51,24 @@ class Recovery:
         skip: int = 0,
         response: float = 0.2,
         looks: bool = True,
+        searches: bool = True,
     ) -> None:
+        robot = world.robot
+        self._distance = distance
         self._response = response
-        self._shape = footprint(world.robot)
+        self._looks = looks
+        self._searches = searches and robot.drive is Drive.DIFFERENTIAL  # it turns on the spot
+        self._from = self._tried_from = world.robot_pose
+        self._shape = footprint(robot)
         self._walls = obstacles(world.static)
         self._scratch = np.empty_like(self._shape.vertices)
-        self._retreat: Retreat | None = Retreat(
-            world.robot, world.robot_pose, distance, skip, self._is_closed if looks else None
+        skip %= len(_WAYS)
+        commands = (
+            clamp_twist(robot, speed * robot.max_speed, turn * robot.max_turn_rate)
+            for speed, turn in (*_WAYS[skip:], *_WAYS[:skip])
         )
+        self._ways = [way for way in commands if way.linear or way.angular]
+        self._stall = StallChecker(robot, _PATIENCE)
         self._path: PoseFollower | None = None
 
     def command(self, world: World, held: float) -> Twist | None:
@@ -61,18 +78,50 @@ class Recovery:
             world: the scene now.
             held: for how long the command will be held [s].
         """
-        if self._retreat is not None:
-            command = self._retreat.command(world.robot_pose, world.time, held)
-            if command is not None:
-                return command
-            turns = world.robot.drive is Drive.DIFFERENTIAL  # on the spot, as the path asks for
-            path = recovery_path(world, 0.0) if turns and not self._retreat.got_away else None
-            self._retreat = None
-            if path is not None:
-                self._path = PoseFollower(world.robot, path, self._response)
+        pose = world.robot_pose
         if self._path is None:
+            if self._has_got_away(pose):
+                self._ways = []
+                self._searches = False
+            way = self._way(world)
+            if way is not None:
+                return way
+            path = recovery_path(world, 0.0) if self._searches else None
+            self._searches = False
+            if path is None:
+                return None
+            self._path = PoseFollower(world.robot, path, self._response)
+        return self._path.command(pose, world.time, held)
+
+    def _has_got_away(self, pose: FloatArray) -> bool:
+        turned = abs(math.remainder(float(pose[2] - self._from[2]), math.tau))
+        return math.dist(pose[:2], self._from[:2]) >= self._distance or turned > _TURNED
+
+    def _way(self, world: World) -> Twist | None:
+        """The first way that nothing is known to be in."""
+        pose = world.robot_pose
+        stopped = bool(self._ways) and self._stall.update(pose, world.time)
+        while self._ways and (stopped or (self._looks and self._is_closed(pose, self._ways[0]))):
+            self._give_up_way(world)
+            self._stall.reset()
+            self._stall.update(pose, world.time)
+            stopped = False
+        if not self._ways:
             return None
-        return self._path.command(world.robot_pose, world.time, held)
+        self._stall.send(self._ways[0])
+        return self._ways[0]
+
+    def _give_up_way(self, world: World) -> None:
+        """Take the next way; straight back once more if the last one has freed the robot."""
+        robot = world.robot
+        pose = world.robot_pose
+        tried = self._ways.pop(0)
+        freed = math.dist(pose[:2], self._tried_from[:2]) > _FREED * robot.circumscribed_radius
+        if freed and self._ways:
+            back = clamp_twist(robot, -robot.max_speed, 0.0)
+            if back.linear and tried != back:
+                self._ways.insert(0, back)
+        self._tried_from = pose
 
     def _is_closed(self, pose: FloatArray, way: Twist) -> bool:
         """Return True if a motion leads deeper into static obstacles than the robot is."""

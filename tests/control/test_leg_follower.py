@@ -5,9 +5,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pushplan.control import LegFollower, Legs, Retreat, StallChecker
+from pushplan.control import LegFollower, Legs, Recovery, StallChecker
 from pushplan.control.limits import arc_twist
-from pushplan.world import Drive, InvalidInputError, RobotModel, Twist
+from pushplan.world import (
+    Drive,
+    GoalDisc,
+    InvalidInputError,
+    Movables,
+    RobotModel,
+    StaticMap,
+    Twist,
+    World,
+)
 
 SQUARE = [(0.1, 0.1), (-0.1, 0.1), (-0.1, -0.1), (0.1, -0.1)]
 places = st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0))
@@ -140,26 +149,34 @@ def test_a_stall_is_told_from_a_slow_robot(period, fraction):
     assert stalled == (fraction < 0.1)
 
 
+def open_floor(**changes: object) -> World:
+    goal = GoalDisc(np.array([4.0, 0.0]), 0.5)
+    bounds = StaticMap.build(bounds=[-5, -5, 5, 5])
+    return World(robot(**changes), np.zeros(3), bounds, Movables.empty(), goal)
+
+
 @pytest.mark.parametrize("period", [0.02, 0.2])
-def test_a_retreat_tries_one_way_after_another(period):
+def test_a_recovery_tries_one_way_after_another(period):
     """Only ahead is free."""
-    retreat, pose, time = Retreat(robot(), np.zeros(3), 0.1), np.zeros(3), 0.0
-    while (twist := retreat.command(pose, time, period)) is not None:
+    world = open_floor()
+    recovery = Recovery(world, 0.1, searches=False)
+    while (twist := recovery.command(world, period)) is not None:
+        pose = world.robot_pose
         if twist.linear > 0.0 and twist.angular == 0.0:
             pose = driven(pose, twist, period)
-        time += period
-        assert time < 20.0
-    assert retreat.got_away and pose[0] >= 0.1
-    closed, time = Retreat(robot(), np.zeros(3), 0.1), 0.0
-    while closed.command(np.zeros(3), time, period) is not None:
-        time += period
-        assert time < 20.0
-    assert not closed.got_away
+        world = world.moved(robot_pose=pose, time=world.time + period)
+        assert world.time < 20.0
+    assert world.robot_pose[0] >= 0.1
+    world = open_floor()
+    closed = Recovery(world, 0.1, searches=False)
+    while closed.command(world, period) is not None:
+        world = world.moved(time=world.time + period)
+        assert world.time < 20.0
 
 
-def test_a_robot_that_cannot_reverse_retreats_otherwise():
-    retreat = Retreat(robot(min_speed=0.0), np.zeros(3), 0.1)
-    assert retreat.command(np.zeros(3), 0.0, 0.1) != Twist(0.0, 0.0)
+def test_a_robot_that_cannot_reverse_recovers_otherwise():
+    world = open_floor(min_speed=0.0)
+    assert Recovery(world, 0.1).command(world, 0.1) != Twist(0.0, 0.0)
 
 
 @given(length=st.floats(-1.0, 1.0), turn=st.floats(-3.0, 3.0), rate=st.floats(0.05, 2.0))

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from pushplan.control import ImmediateExecutor, PoseFollower, Retreat
+from pushplan.control import ImmediateExecutor, PoseFollower, Recovery
 from pushplan.planners.rearrangement.push import Push, PushCost, PushHistory, push_plan, signature
 from pushplan.planners.rearrangement.push_choice import (
     PendingChoice,
@@ -79,7 +79,7 @@ class GtspMpc(RearrangementPolicy):
         self._choosing: PendingChoice | None = None
         self._execution: PushExecution | None = None
         self._shown: Push | None = None
-        self._away: Retreat | PoseFollower | None = None
+        self._away: Callable[[World, float], Twist | None] | None = None
         self._cache = RolloutCache()
         self._history = PushHistory()
         self._left = -1
@@ -136,7 +136,7 @@ class GtspMpc(RearrangementPolicy):
         held = self._clock.held
         for _ in range(4):  # jobs that end at once
             if self._away is not None:
-                away = self._away.command(world.robot_pose, world.time, held)
+                away = self._away(world, held)
                 if away is not None:
                     return away
                 self._away = None
@@ -217,7 +217,8 @@ class GtspMpc(RearrangementPolicy):
         moved = before is None or bool(np.abs(before - here).max() > 0.02 * scene.size)
         if choice.way_out is not None and moved:
             self._recovered_from = here
-            self._away = PoseFollower(scene.world.robot, choice.way_out, self.config.response)
+            follower = PoseFollower(scene.world.robot, choice.way_out, self.config.response)
+            self._away = lambda world, held: follower.command(world.robot_pose, world.time, held)
             self._cache = RolloutCache()  # that nothing was found is no longer true out there
             return True
         if choice.interrupted:  # the next search begins with what is known by now
@@ -259,9 +260,10 @@ class GtspMpc(RearrangementPolicy):
         if end is ExecutionEnd.DONE:
             self._history.count_relocation(push)
         if end is ExecutionEnd.STUCK:
-            robot = scene.world.robot
-            pose = scene.world.robot_pose
-            self._away = Retreat(robot, pose, _RETREAT * scene.size, self._stuck)
+            distance = _RETREAT * scene.size
+            self._away = Recovery(
+                scene.world, distance, skip=self._stuck, looks=False, searches=False
+            ).command
             self._stuck += 1
 
 
