@@ -5,16 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from pushplan.control.episode_clock import EpisodeClock
 from pushplan.control.limits import TwistLimiter, approach_speed, clamp_twist, driven_twist
-from pushplan.control.stage_follower import StageFollower
+from pushplan.control.staged_controller import StagedController
 from pushplan.control.tracking import Progress
 from pushplan.world import Drive, Plan, RobotModel, Twist, World
 from pushplan.world.checks import number
 
 
 @dataclass
-class PathFollower:
+class PathFollower(StagedController):
     """The plan's own curvature, plus feedback on offset and heading.
 
     With offset d (left of the path positive), heading error ψ and path curvature κ the command is
@@ -35,26 +34,11 @@ class PathFollower:
 
     def __post_init__(self) -> None:
         number("distance", self.distance, low=0.0, open_low=True)
-        self._clock = EpisodeClock(self.period)
+        self._hold_commands(self.period)
         self._limiter: TwistLimiter | None = None
-        self._stages = StageFollower(self._follow, self._begin, self._clock)
-
-    def reset(self, world: World) -> None:
-        """See `pushplan.world.Controller`."""
-        self._clock.reset()
-        self._stages.reset()
-        self._begin()
 
     def _begin(self) -> None:
         self._limiter = None
-
-    def command(self, world: World, plan: Plan) -> Twist:
-        """See `pushplan.world.Controller`.
-
-        Past the end of the plan the robot stops; a constant-speed robot drives on along the last
-        heading.
-        """
-        return self._clock.command_for(world, lambda _: self._stages.command(world, plan))
 
     def _follow(self, world: World, plan: Plan) -> Twist:
         robot = world.robot

@@ -5,16 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from pushplan.control.episode_clock import EpisodeClock
 from pushplan.control.limits import clamp_twist
-from pushplan.control.stage_follower import StageFollower
+from pushplan.control.staged_controller import StagedController
 from pushplan.control.tracking import Progress
 from pushplan.world import Drive, Plan, Twist, World
 from pushplan.world.checks import number
 
 
 @dataclass
-class PurePursuit:
+class PurePursuit(StagedController):
     """Pure pursuit (Coulter, CMU-RI-TR-92-01): the arc through a point ahead on the path.
 
     Good for paths with corners, which it rounds; it cuts curves by about l² κ / 8. Where a plan is
@@ -28,26 +27,11 @@ class PurePursuit:
 
     def __post_init__(self) -> None:
         number("lookahead", self.lookahead, low=0.0, open_low=True)
-        self._clock = EpisodeClock(1.0)
+        self._hold_commands(1.0)
         self._progress: Progress | None = None
-        self._stages = StageFollower(self._follow, self._begin, self._clock)
-
-    def reset(self, world: World) -> None:
-        """See `pushplan.world.Controller`."""
-        self._clock.reset()
-        self._stages.reset()
-        self._begin()
 
     def _begin(self) -> None:
         self._progress = None
-
-    def command(self, world: World, plan: Plan) -> Twist:
-        """See `pushplan.world.Controller`.
-
-        Past the end of the plan the robot stops; a constant-speed robot drives on along the last
-        heading.
-        """
-        return self._clock.command_for(world, lambda _: self._stages.command(world, plan))
 
     def _follow(self, world: World, plan: Plan) -> Twist:
         robot = world.robot

@@ -8,7 +8,6 @@ from functools import partial
 import numpy as np
 
 from pushplan.compiled import owned
-from pushplan.control.episode_clock import EpisodeClock
 from pushplan.control.limits import driven_twist
 from pushplan.control.mpc.horizon import FAILED, make_horizon, solve_rounds, track_of
 from pushplan.control.mpc.mpc_config import MpcConfig
@@ -21,13 +20,13 @@ from pushplan.control.mpc.tracker_kernels import (
     finish_step,
 )
 from pushplan.control.mpc.tracking_kernels import Tuning, assembly_memory
-from pushplan.control.stage_follower import StageFollower
+from pushplan.control.staged_controller import StagedController
 from pushplan.world import Drive, Plan, RobotModel, Twist, World
 from pushplan.world.checks import expect
 
 
 @dataclass
-class MpcTracker:
+class MpcTracker(StagedController):
     """Model-predictive path tracking for constant-speed robots, differential drives and cars.
 
     Each call solves one quadratic program for the turn rates of the next N steps (and the speeds,
@@ -50,11 +49,10 @@ class MpcTracker:
         expect("config", self.config, MpcConfig)
         self._robot: RobotModel | None = None
         self._plan: Plan | None = None
-        self._clock = EpisodeClock(self.config.period)
+        self._hold_commands(self.config.period)
         self._out = np.zeros(2)
         self._memory: TrackerMemory | None = None
         self._earlier = 0  # failures of memories before
-        self._stages = StageFollower(self._follow, self._begin, self._clock)
 
     @property
     def fallbacks(self) -> int:
@@ -64,22 +62,12 @@ class MpcTracker:
 
     def reset(self, world: World) -> None:
         """See `pushplan.world.Controller`."""
-        self._clock.reset()
-        self._stages.reset()
         self._memory = None
         self._earlier = 0
-        self._begin()
+        super().reset(world)
 
     def _begin(self) -> None:
         self._robot = None
-
-    def command(self, world: World, plan: Plan) -> Twist:
-        """See `pushplan.world.Controller`.
-
-        Past the end of the plan the robot stops; a constant-speed robot drives on
-        along the last heading.
-        """
-        return self._clock.command_for(world, lambda _: self._stages.command(world, plan))
 
     def _follow(self, world: World, plan: Plan) -> Twist:
         """Start afresh in a new episode, on a new plan, or where the robot is another one."""

@@ -1,10 +1,10 @@
-"""`StageFollower`: plans that turn on the spot or go back, for controllers that drive ahead."""
+"""`StagedController`: plans that turn on the spot or go back, for controllers that drive ahead."""
 
 from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
+from abc import ABC, abstractmethod
 from dataclasses import replace
 
 import numpy as np
@@ -17,66 +17,70 @@ from pushplan.world import Plan, RobotModel, Stage, Twist, World
 _WINDOW = 2.0  # of its progress [circumscribed radii]
 
 
-class StageFollower:
-    """Drives a plan stage by stage: turns by itself, the rest by a controller.
+class StagedController(ABC):
+    """Drives a plan stage by stage: turns by itself, the rest as its kind of controller does.
 
-    Of a stage that goes back the controller sees the mirror image: a robot whose front is its
-    rear, on a path that it drives ahead. Before a stage that another one follows is over, the
-    robot slows down so that it comes to a stand there. A plan of one stage that is driven ahead
-    goes to the controller as it is.
-
-    Args:
-        follow: the command of the controller for a world and a plan that is driven ahead.
-        begin: forgets what the controller knows, before another stage.
-        clock: knows for how long commands are held, and the last one.
+    Of a stage that goes back `_follow` sees the mirror image: a robot whose front is its rear, on a
+    path that it drives ahead. Before a stage that another one follows is over, the robot slows
+    down so that it comes to a stand there. Of a plan of one stage that is driven ahead it sees the
+    plan as it is.
     """
 
-    def __init__(
-        self,
-        follow: Callable[[World, Plan], Twist],
-        begin: Callable[[], None],
-        clock: EpisodeClock,
-    ) -> None:
-        self._follow = follow
-        self._begin = begin
-        self._clock = clock
-        self.reset()
+    @abstractmethod
+    def _follow(self, world: World, plan: Plan) -> Twist:
+        """The velocity on a plan that is driven ahead."""
 
-    def reset(self) -> None:
-        """Forget the episode."""
-        self._progress: Progress | None = None
-        self._plan: Plan | None = None
+    @abstractmethod
+    def _begin(self) -> None:
+        """Forget what was learned on the way, before another stage."""
+
+    def _hold_commands(self, period: float) -> None:
+        """Begin with the first command held for a period [s]."""
+        self._clock = EpisodeClock(period)
+        self._forget_stage()
+
+    def _forget_stage(self) -> None:
+        self._whole: Plan | None = None
         self._part: Plan | None = None
         self._stage: Stage | None = None
         self._direction: int | None = None
+        self._place: Progress | None = None
+
+    def reset(self, world: World) -> None:
+        """See `pushplan.world.Controller`."""
+        self._clock.reset()
+        self._forget_stage()
+        self._begin()
 
     def command(self, world: World, plan: Plan) -> Twist:
         """See `pushplan.world.Controller`; within the accelerations of the robot.
 
-        Args:
-            world: the scene now.
-            plan: the whole plan.
+        Past the end of the plan the robot stops; a constant-speed robot drives on along the last
+        heading.
         """
+        return self._clock.command_for(world, lambda _: self._by_stages(world, plan))
+
+    def _by_stages(self, world: World, plan: Plan) -> Twist:
         if len(plan.stages) == 1 and plan.stages[0].direction == 1:
             self._take_up(1)
             return self._follow(world, plan)
         robot = world.robot
-        size = world.robot.circumscribed_radius
-        if self._progress is None or self._progress.window != _WINDOW * size:
-            self._progress = Progress(_WINDOW * size)
-        self._progress.update(plan, world.robot_pose)
-        stage = self._progress.stage
-        if plan is not self._plan or stage != self._stage:
+        window = _WINDOW * robot.circumscribed_radius
+        if self._place is None or self._place.window != window:
+            self._place = Progress(window)
+        self._place.update(plan, world.robot_pose)
+        stage = self._place.stage
+        if plan is not self._whole or stage != self._stage:
             self._take_up(stage.direction)
-            self._plan = plan
+            self._whole = plan
             self._stage = stage
             self._part = None
-        wanted = self._on_stage(world, plan, stage, self._progress)
+        wanted = self._on_stage(world, plan, stage, self._place)
         last = self._clock.command
         return ramp_twist(robot, last, wanted.linear, wanted.angular, self._clock.held)
 
     def _take_up(self, direction: int) -> None:
-        """Let the controller begin anew where another direction begins."""
+        """Begin anew where another direction begins."""
         if self._direction is not None and direction != self._direction:
             self._begin()
         self._direction = direction
