@@ -18,13 +18,16 @@ from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.done_places import done_places
 from pushplan.planners.rearrangement.pose_grid_kernels import LENGTHS, MOVES
 from pushplan.planners.rearrangement.push_pose_kernels import pushable_moves
-from pushplan.planners.rearrangement.rearrangement_config import SHIFTS, RelocationConfig
+from pushplan.planners.rearrangement.rearrangement_config import SHIFTS
 from pushplan.world import ClearanceArea, Goal, Receptacle, RobotModel, StaticMap
 from pushplan.world.checks import BoolArray, FloatArray
 
 _INSET = 1.05  # distance of an object from the edges of a receptacle when it is done [radii]
 _KEPT = 20_000  # greatest number of lengths and paths that are kept
+_CELL = 0.125  # side of a cell [circumscribed radii of the robot]
 _MOST_CELLS = 160  # along the longer side of a map
+_DRAG_COST = 10.0
+"""Cost of a metre of an object's way on which the robot does not fit behind it [m pushed]."""
 
 
 class ObjectPaths:
@@ -111,7 +114,7 @@ class PushCostToGo:
         half_width: of the bumper [m].
         slack: clearance between bumper and object [m].
         margin: that the robot keeps from what is static [m].
-        config: side of a cell, and the cost where the robot does not fit.
+        drag_cost: cost of a metre where the robot does not fit [m].
     """
 
     def __init__(
@@ -124,13 +127,13 @@ class PushCostToGo:
         half_width: float,
         slack: float,
         margin: float,
-        config: RelocationConfig,
+        drag_cost: float = _DRAG_COST,
     ) -> None:
-        self._drag_cost = config.drag_cost
+        self._drag_cost = drag_cost
         low = static.bounds[:2]
         high = static.bounds[2:]
         sides = high - low
-        self._step = max(config.cell * robot.circumscribed_radius, float(sides.max()) / _MOST_CELLS)
+        self._step = max(_CELL * robot.circumscribed_radius, float(sides.max()) / _MOST_CELLS)
         cols, rows = (int(side) for side in np.floor(sides / self._step) + 1)
         self._low = low + 0.5 * (sides - self._step * np.array([cols - 1, rows - 1]))
         x = self._low[0] + self._step * np.arange(cols)

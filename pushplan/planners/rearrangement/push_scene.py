@@ -440,7 +440,6 @@ class PushScene:
             half_width=self.half,
             slack=_SLACK * self.size,
             margin=_LEAST_MARGIN * self.size,
-            config=self.config.relocation,
         )
 
     def pose_behind(self, k: int, heading: float, shift: float) -> FloatArray:

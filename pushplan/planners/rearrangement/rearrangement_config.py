@@ -15,7 +15,6 @@ from pushplan.world.checked_fields import (
     NonNegativeFloat,
     NonNegativeInt,
     OneOf,
-    PositiveFloat,
     PositiveInt,
 )
 
@@ -71,37 +70,6 @@ PRIMITIVES = _shipped()
 
 
 @dataclass(frozen=True)
-class RelocationConfig(CheckedFields):
-    """Settings of the search for relocations. Lengths are in circumscribed radii of the robot.
-
-    Args:
-        cell: side of a cell of `PushCostToGo`.
-        drag_cost: what a metre of an object's way costs on which the robot does not fit behind it,
-            in metres pushed.
-        curvatures: of the arcs, times the robot's circumscribed radius.
-        depth: how many arcs follow one another at most.
-        expansions: how many states are driven on from, starts not counted.
-        errors: of the prediction, that a push home afterwards has to stand: along x and y
-            [circumscribed radii], and in heading [rad].
-        margins: factors on them; a drive costs a radius more for each that it does not stand.
-    """
-
-    cell: PositiveFloat = 0.125
-    drag_cost: PositiveFloat = 10.0
-    curvatures: tuple[float, ...] = (0.0, 0.7, -0.7, 1.6, -1.6)
-    depth: PositiveInt = 3
-    expansions: PositiveInt = 400
-    errors: tuple[tuple[float, float, float], ...] = (
-        (0.08, 0.08, 0.15),
-        (-0.08, 0.08, -0.15),
-        (0.0, -0.1, 0.0),
-    )
-    margins: tuple[float, ...] = (1.0, 2.0, 3.0)
-
-    field_prefix: ClassVar[str] = "relocation "
-
-
-@dataclass(frozen=True)
 class RearrangementConfig(CheckedFields):
     """Settings of candidate pushes and their costs. Lengths are in circumscribed radii.
 
@@ -133,7 +101,6 @@ class RearrangementConfig(CheckedFields):
         max_rounds: how often pushes that have failed are tried anew before what is left is given
             up.
         primitives: the table of pushes that are tried.
-        relocation: settings of the search for relocations.
     """
 
     work_weight: Annotated[float, Limits(0.0, 1e6)] = 12.0
@@ -156,7 +123,6 @@ class RearrangementConfig(CheckedFields):
     heading_noise: NonNegativeFloat = 0.0
     max_rounds: NonNegativeInt = 6
     primitives: tuple[PushPrimitive, ...] = PRIMITIVES
-    relocation: RelocationConfig = RelocationConfig()
 
     field_prefix: ClassVar[str] = "rearrangement "
 

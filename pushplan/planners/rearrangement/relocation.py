@@ -38,7 +38,15 @@ from pushplan.world.checks import FloatArray
 _Cell = tuple[float, ...]
 
 # Lengths are in circumscribed radii of the robot.
+_CURVATURES = (0.0, 0.7, -0.7, 1.6, -1.6)
+"""Curvatures of the arcs, times the robot's circumscribed radius."""
 _ARC_LENGTH = 1.6  # of one arc
+_DEPTH = 3  # so many arcs follow one another at most
+_EXPANSIONS = 400  # so many states are driven on from, starts not counted
+_ERRORS = np.array([[0.08, 0.08, 0.15], [-0.08, 0.08, -0.15], [0.0, -0.1, 0.0]])
+"""Errors of the prediction that a push home afterwards has to stand: x, y, and heading [rad]."""
+_MARGINS = (1.0, 2.0, 3.0)
+"""Factors on them; a drive costs a radius more for each that it does not stand."""
 _LITTLE = 0.25  # part of the gain that helps too where nothing else does
 _STARTS = 300
 """From so many places round the object a drive may begin, besides those of the table."""
@@ -142,7 +150,6 @@ class _RelocationSearch:
         self._scene = scene
         self._k = k
         self._approach = approach
-        self._config = scene.config.relocation
         self._thorough = thorough
         self._slack = math.inf if thorough else _DEARER * scene.size
         self._horizon = _HORIZON * scene.size
@@ -153,7 +160,7 @@ class _RelocationSearch:
         arcs = [
             (sign * step, curvature * step / scene.size)
             for sign in signs
-            for curvature in self._config.curvatures
+            for curvature in _CURVATURES
         ]
         self._arcs = np.array([*arcs, (0.0, 0.1), (0.0, -0.1)])
         """(A, 2) distance [m], negative backward, and turn [rad] of one step of each arc."""
@@ -169,7 +176,6 @@ class _RelocationSearch:
         """Drives, each with the cost of what it leaves to be done [m]."""
         scene = self._scene
         k = self._k
-        config = self._config
         if can_be_pushed(scene, k, self._horizon):  # but not all the way
             self._horizon = scene.longest
         now = float(self._rest(scene.poses[[k]])[0])
@@ -178,12 +184,12 @@ class _RelocationSearch:
             away = float((self._approach.costs[nodes] + extra).min()) if len(nodes) else math.inf
             if math.isfinite(away):
                 self._put(_State(None, start[None], scene.poses, 0, away, now))
-        most = len(config.margins)
+        most = len(_MARGINS)
         best = math.inf
         expansions = 0
         sides = Counter[_Cell]()
         alike = Counter[_Cell]()
-        while self._open and expansions < config.expansions and sides.total() < _ENOUGH:
+        while self._open and expansions < _EXPANSIONS and sides.total() < _ENOUGH:
             if scene.budget.is_over:
                 break
             state = heapq.heappop(self._open)[2]
@@ -205,7 +211,7 @@ class _RelocationSearch:
                 sides[side] = max(sides[side], stands)
                 if stands:
                     best = min(best, state.cost + (most - stands) * scene.size)
-                if stands or state.depth == config.depth or alike[place] >= _MOST_ALIKE:
+                if stands or state.depth == _DEPTH or alike[place] >= _MOST_ALIKE:
                     continue
                 alike[place] += 1
             expansions += state.depth > 0
@@ -305,12 +311,11 @@ class _RelocationSearch:
 
     def _failing_margins(self, state: _State) -> int:
         """Count the margins that a push home from the object's place does not tolerate."""
-        config = self._config
         if not self._delivers(state, np.zeros(3)):
-            return len(config.margins)
-        for n, margin in enumerate(config.margins):
-            if not all(self._delivers(state, margin * np.array(by)) for by in config.errors):
-                return len(config.margins) - n
+            return len(_MARGINS)
+        for n, margin in enumerate(_MARGINS):
+            if not all(self._delivers(state, margin * by) for by in _ERRORS):
+                return len(_MARGINS) - n
         return 0
 
     def _delivers(self, state: _State, by: FloatArray) -> bool:
