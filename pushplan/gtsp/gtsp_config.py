@@ -29,22 +29,13 @@ class GtspConfig(CheckedFields):
         memory_mb: of a table of dynamic programming at most [MB].
         lower_bound: whether to spend time on a lower bound and a proof.
         proof_fraction: of a time budget that the proof may take.
-        proof_states: paths that the proof keeps at once at most.
-        neighbours: clusters on the list of each cluster; a third more where costs differ both ways.
-        swap_neighbours: of these, how many a segment swap tries.
-        max_removed: clusters that a round takes out at most.
-        removed_fraction: the same, as a fraction of all clusters (but at least 4).
         blink: fraction of places that an insertion overlooks (Christiaens and Vanden Berghe 2020).
-        hot: temperature at the beginning of a run.
-        cold: temperature at its end.
+        hot: temperature at the beginning of a run from a random order.
         frozen: a run ends early at this fraction of the temperature at which its tour was cheapest.
-        reheat: temperature at which a run from the best tour begins, for each unit of that at which
-            the best tour was found.
         whole: fraction of what a run from a random order has taken on average; where less is left
             of the budget, runs begin from the best tour.
         narrow_from: size of the cluster of a node, on average over nodes, from which on the search
             keeps promising nodes only.
-        narrow_after: fraction of the first run after which it does.
         narrow_slack: a node is promising if one of the tours so far would have cost at most this
             much more by way of it, in units of the temperature.
         narrow_width: promising nodes of a cluster at most.
@@ -63,19 +54,11 @@ class GtspConfig(CheckedFields):
     memory_mb: PositiveFloat = 1024.0
     lower_bound: bool = False
     proof_fraction: Fraction = 0.7
-    proof_states: PositiveInt = 2_000_000
-    neighbours: PositiveInt = 12
-    swap_neighbours: PositiveInt = 8
-    max_removed: PositiveInt = 20
-    removed_fraction: Fraction = 0.3
     blink: Annotated[float, Limits(0.0, 0.5)] = 0.01
     hot: PositiveFloat = 2.0
-    cold: PositiveFloat = 0.03
     frozen: Fraction = 0.4
-    reheat: PositiveFloat = 2.0
     whole: Fraction = 0.8
     narrow_from: PositiveFloat = 7.0
-    narrow_after: Fraction = 0.3
     narrow_slack: PositiveFloat = 1.0
     narrow_width: PositiveInt = 24
     restarts: PositiveInt = 12

@@ -19,6 +19,15 @@ NARROW_ROUNDS = 1000
 """Rounds without which nothing is known of how promising a node is."""
 NARROW_S = 1e-7
 """Time that it takes to go on with fewer nodes at most, for each pair of nodes [s]."""
+_NEIGHBOURS = 12  # clusters on the list of each one; a third more where costs differ both ways
+_SWAP_NEIGHBOURS = 8  # of these, so many are tried by a segment swap
+_MOST_REMOVED = 20  # clusters that a round takes out
+_REMOVED_FRACTION = 0.3  # the same, as a fraction of all clusters (but at least 4)
+# temperatures, in units of a mean reduced arc of the tour
+_COLD = 0.03  # at the end of a run
+_REHEAT = 2.0
+"""Temperature at which a run from the best tour begins, times that at which it was found."""
+_NARROW_AFTER = 0.3  # fraction of the first run after which only promising nodes are kept
 
 
 @dataclass
@@ -78,9 +87,9 @@ class AnytimeSearch:
         self.config = config
         self.budget = budget
         self.floor = problem.floor
-        fraction = max(4, int(config.removed_fraction * problem.count))
-        self.max_removed = max(1, min(config.max_removed, fraction, problem.count - 2))
-        self.best_heat = config.cold
+        fraction = max(4, int(_REMOVED_FRACTION * problem.count))
+        self.max_removed = max(1, min(_MOST_REMOVED, fraction, problem.count - 2))
+        self.best_heat = _COLD
         self.pace = 3e-5 + 3e-7 * problem.width**2
         self.narrowed = False
         rest = np.delete(np.arange(problem.count), problem.root)
@@ -95,9 +104,7 @@ class AnytimeSearch:
     def _use(self, problem: Problem) -> None:
         """Go on with this problem."""
         config = self.config
-        near, between = problem.nearest(
-            config.neighbours if problem.symmetric else config.neighbours * 4 // 3
-        )
+        near, between = problem.nearest(_NEIGHBOURS if problem.symmetric else _NEIGHBOURS * 4 // 3)
         self.problem = problem
         self.arrays = TourProblem(
             problem.finite,
@@ -109,7 +116,7 @@ class AnytimeSearch:
             between,
             self.max_removed,
             config.blink,
-            min(config.swap_neighbours, near.shape[1]),
+            min(_SWAP_NEIGHBOURS, near.shape[1]),
             problem.symmetric,
         )
 
@@ -130,11 +137,11 @@ class AnytimeSearch:
         frozen = 0.0
         first = not again
         hot = config.hot
-        cold = config.cold
+        cold = _COLD
         if again:
             self.tour.current[:] = self.tour.best
             self.tour.current_nodes[:] = self.tour.best_nodes
-            hot = config.reheat * self.best_heat
+            hot = _REHEAT * self.best_heat
             cold = 0.5 * config.frozen * self.best_heat
         else:
             self._random_start()
@@ -145,7 +152,7 @@ class AnytimeSearch:
             progress = min(max((gone - begin) / (end - begin), 0.0), 1.0)
             heat = hot * (cold / hot) ** progress
             before = values[1]
-            if progress > config.narrow_after and not self.narrowed:
+            if progress > _NARROW_AFTER and not self.narrowed:
                 self._narrow(heat * self.scale)
             self._rounds(0.0 if first else heat * self.scale)
             if values[1] < before and not first:

@@ -33,6 +33,7 @@ UNTIMED_S = 5.0
 """Dynamic programming that takes longer is left to the search where time has no limit [s]."""
 PROOF_SETUP_S = 6e-8
 """Time that a proof takes before it looks at the stop rule, for each pair of nodes [s]."""
+_PROOF_STATES = 2_000_000  # paths that a proof keeps at once at most
 _DEFAULT = GtspConfig()
 
 
@@ -170,7 +171,7 @@ class _SolverCall:
         if not prove_it or late or budget.check(0, cost):
             return self._tour(problem.names[nodes], bound)
         budget.note(cost)
-        proof = prove(problem, cost, lambda: budget.check(0, budget.cost), config.proof_states)
+        proof = prove(problem, cost, lambda: budget.check(0, budget.cost), _PROOF_STATES)
         self.detail["paths"] = float(proof.paths)
         if proof.nodes is not None:
             nodes = proof.nodes
