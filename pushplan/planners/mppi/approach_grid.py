@@ -12,7 +12,7 @@ from pushplan.planners.mppi.fields import Field, finite
 from pushplan.planners.mppi.mppi_config import MppiConfig
 from pushplan.search.grid_dijkstra import grid_dijkstra
 from pushplan.world import StaticMap, World
-from pushplan.world.checks import FloatArray
+from pushplan.world.checks import FloatArray, frozen
 from pushplan.world.outline import inscribed_radius
 
 _CELL = 0.35  # side of a cell [R]
@@ -121,7 +121,9 @@ def approach_to(world: World, config: MppiConfig, k: int, place: FloatArray) -> 
         np.zeros(grid.shape, np.bool_),
         grid.resolution,
     )
-    field = Field(finite(values), float(grid.origin[0]), float(grid.origin[1]), grid.resolution)
+    field = Field(
+        frozen(finite(values)), float(grid.origin[0]), float(grid.origin[1]), grid.resolution
+    )
     return Approach(
         k,
         field,
