@@ -9,6 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from pushplan.interaction import QuasiStatic
+from pushplan.planners.arguments import check_pusher
+from pushplan.planners.warm_up_worlds import warm_up_worlds
+
 ROOT = Path(__file__).parents[1]
 BENCHMARKS = ROOT / "benchmarks"
 INDEX = (BENCHMARKS / "README.md").read_text(encoding="utf-8")
@@ -47,3 +51,21 @@ def test_the_pages_of_the_index_name_the_command() -> None:
     for (_, pages), subject in zip(LINES, SUBJECTS, strict=True):
         for page in re.findall(r"\]\((.+?)\)", pages):
             assert subject in (BENCHMARKS / page).read_text(encoding="utf-8"), page
+
+
+def test_a_call_path_stays_in_the_files_whose_functions_get_the_world() -> None:
+    from benchmarks.accuracy.call_path import CallPath
+
+    (world,) = warm_up_worlds("pushing")
+    path = CallPath()
+    sys.setprofile(path)
+    for _ in range(2):
+        check_pusher(world)
+        check_pusher(world)
+        QuasiStatic().bodies(world)
+        world.movables.outline_world(0)
+    sys.setprofile(None)
+    assert path.stays == [
+        "planners/arguments.py",
+        "interaction/quasi_static.py",
+    ]
