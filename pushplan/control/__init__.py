@@ -10,7 +10,12 @@ from pushplan.control.leg_follower import LegFollower, Legs
 from pushplan.control.limits import TwistLimiter, clamp_twist
 from pushplan.control.path_follower import PathFollower
 from pushplan.control.pose_follower import PoseFollower
-from pushplan.control.progress_checker import PoseProgressChecker, ProgressChecker, StallChecker
+from pushplan.control.progress_checker import (
+    PoseProgressChecker,
+    ProgressChecker,
+    StallChecker,
+    decrease_by,
+)
 from pushplan.control.pure_pursuit import PurePursuit
 from pushplan.control.recovery import Recovery
 from pushplan.control.tracking import Progress
@@ -38,6 +43,7 @@ __all__ = [
     "StallChecker",
     "TwistLimiter",
     "clamp_twist",
+    "decrease_by",
     "waiting_twist",
 ]
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pushplan.control.limits import clamp_twist
-from pushplan.control.progress_checker import ProgressChecker, StallChecker
+from pushplan.control.progress_checker import ProgressChecker, StallChecker, decrease_by
 from pushplan.world import InvalidInputError, RobotModel, Twist
 from pushplan.world.checks import ArrayRecord, FloatArray, array, number
 
@@ -98,8 +98,8 @@ class LegFollower:
         self._response = number("response", response, low=0.0, open_low=True)
         self._escapes = escapes
         self._stall = StallChecker(robot)
-        self._progress = ProgressChecker(0.01 * size, _PATIENCE)
-        self._aiming = ProgressChecker(0.5 * self._aligned, _PATIENCE)
+        self._progress = ProgressChecker(decrease_by(0.01 * size), _PATIENCE)
+        self._aiming = ProgressChecker(decrease_by(0.5 * self._aligned), _PATIENCE)
         self._next = 0
         self._away: list[tuple[float, float]] = []
         self._take_up()

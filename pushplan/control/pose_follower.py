@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from pushplan.control.limits import arc_twist
-from pushplan.control.progress_checker import ProgressChecker, StallChecker
+from pushplan.control.progress_checker import ProgressChecker, StallChecker, decrease_by
 from pushplan.world import RobotModel, Twist
 from pushplan.world.checks import FloatArray
 
@@ -28,7 +28,7 @@ class PoseFollower:
         self._response = response
         self._next = 1
         self._stall = StallChecker(robot)
-        self._progress: ProgressChecker | None = None
+        self._progress: ProgressChecker[float] | None = None
 
     def command(self, pose: FloatArray, time: float, held: float) -> Twist | None:
         """The velocity to drive now; None when it is there, or does not get there.
@@ -58,7 +58,7 @@ class PoseFollower:
             if self._progress is None:
                 lasts = abs(moves) / robot.max_speed + turns / robot.max_turn_rate
                 patience = _PATIENCE * max(lasts, 2.0 * seconds)
-                self._progress = ProgressChecker(0.01 * size, patience)
+                self._progress = ProgressChecker(decrease_by(0.01 * size), patience)
             if off < 0.3 * (abs(moves) + size * turns) or not self._progress.update(off, time):
                 self._next += 1
                 self._progress = None

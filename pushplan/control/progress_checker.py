@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from copy import copy
+from typing import Generic, TypeVar
 
 from pushplan.world import RobotModel, Twist
 from pushplan.world.checks import FloatArray
@@ -15,38 +18,52 @@ _MOVED = 0.25  # that counts as getting on [circumscribed radii], or [rad]
 _TURN = 0.5  # for which a robot that gets on is given time [rad]
 _RESPONSE = 0.5  # that delays and slow motors may take [s]
 
+Seen = TypeVar("Seen")
 
-class ProgressChecker:
-    """Watches a quantity that has to become less.
+
+class ProgressChecker(Generic[Seen]):
+    """Watches whether something gets on, by any quantity that can be measured.
 
     Args:
-        least: by how much it has to become less to count as progress.
+        gets_on: returns True if the second measurement is progress since the first; see
+            `decrease_by`.
         patience: time without progress that is allowed [s].
+
+    Attributes:
+        patience: the same.
+        idle: time since the last progress [s].
     """
 
-    def __init__(self, least: float, patience: float) -> None:
-        self._least = least
-        self._patience = patience
+    def __init__(self, gets_on: Callable[[Seen, Seen], bool], patience: float) -> None:
+        self._gets_on = gets_on
+        self.patience = patience
         self.reset()
 
     def reset(self) -> None:
-        """Begin anew, with another thing to do."""
-        self._best = math.inf
-        self._since = math.inf
+        """Begin anew, with another thing to do or after waiting for something."""
+        self._last: Seen | None = None
+        self.idle = 0.0
 
-    def update(self, left: float, time: float) -> bool:
-        """Take what is left to do at a time [s]; returns whether it gets on."""
-        if left < self._best - self._least or self._best == math.inf:
-            self._best = left
+    def update(self, seen: Seen, time: float) -> bool:
+        """Take what is measured at a time [s]; returns True while it gets on."""
+        if self._last is None or self._gets_on(self._last, seen):
+            self._last = copy(seen)  # an array may be written over by the caller
             self._since = time
-        return time - self._since <= self._patience
+        self.idle = time - self._since
+        return self.idle <= self.patience
 
 
-class PoseProgressChecker:
+def decrease_by(least: float) -> Callable[[float, float], bool]:
+    """Progress of a quantity that has to become less, each time by more than ``least``."""
+    return lambda best, left: left < best - least
+
+
+class PoseProgressChecker(ProgressChecker[FloatArray]):
     """Watches whether a robot gets away from where it was, whatever it is told to drive.
 
     Going by a quarter of the circumscribed radius, or turning by a quarter of a radian, is getting
-    on: the `PoseProgressChecker` of Nav2, with a time that goes with the robot.
+    on: the `PoseProgressChecker` of Nav2, with a time that goes with the robot. Its patience is the
+    time in which the robot could go by its radius, and turn.
 
     Args:
         robot: its size, speeds and accelerations.
@@ -56,28 +73,11 @@ class PoseProgressChecker:
         self._size = robot.circumscribed_radius
         going = self._size / robot.max_speed + robot.max_speed / robot.max_acceleration
         turning = _TURN / robot.max_turn_rate + robot.max_turn_rate / robot.max_turn_acceleration
-        self.patience = going + turning + _RESPONSE
-        """Time in which it could go by its radius, and turn [s]."""
-        self.reset()
+        super().__init__(self._has_moved, going + turning + _RESPONSE)
 
-    def reset(self) -> None:
-        """Begin anew, for instance after waiting for something."""
-        self._from: FloatArray | None = None
-        self.idle = 0.0
-        """Time for which it has not got on [s]."""
-
-    def update(self, pose: FloatArray, time: float) -> bool:
-        """Take the pose (3,) at a time [s]; returns whether the robot gets on."""
-        if self._from is None or self._has_moved(pose):
-            self._from = pose.copy()
-            self._since = time
-        self.idle = time - self._since
-        return self.idle <= self.patience
-
-    def _has_moved(self, pose: FloatArray) -> bool:
-        assert self._from is not None
-        turn = math.remainder(float(pose[2] - self._from[2]), math.tau)
-        return math.dist(pose[:2], self._from[:2]) >= _MOVED * self._size or abs(turn) >= _MOVED
+    def _has_moved(self, before: FloatArray, pose: FloatArray) -> bool:
+        turn = math.remainder(float(pose[2] - before[2]), math.tau)
+        return math.dist(pose[:2], before[:2]) >= _MOVED * self._size or abs(turn) >= _MOVED
 
 
 class StallChecker:
@@ -103,7 +103,7 @@ class StallChecker:
         self._command = Twist(0.0, 0.0)
 
     def update(self, pose: FloatArray, time: float) -> bool:
-        """Take the pose (3,) at a time [s]; returns whether something stops the robot."""
+        """Take the pose (3,) at a time [s]; returns True if something stops the robot."""
         if self._from is not None:
             seconds = time - self._time
             self._told += seconds * self._path(self._command.linear, self._command.angular)

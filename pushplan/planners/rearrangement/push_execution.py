@@ -8,7 +8,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pushplan.control import EpisodeClock, LegFollower, PoseFollower, ProgressChecker, StallChecker
+from pushplan.control import (
+    EpisodeClock,
+    LegFollower,
+    PoseFollower,
+    ProgressChecker,
+    StallChecker,
+    decrease_by,
+)
 from pushplan.control.limits import arc_twist
 from pushplan.planners.pushing import PushingConfig, PushingMpc, PushParameters, PushPath
 from pushplan.planners.rearrangement.approach import Route
@@ -103,7 +110,7 @@ class PathPush:
         self._plan = path.plan(robot, target)
         self._pusher = pusher
         patience = max(scene.size / robot.max_speed, _TURN_PATIENCE / robot.max_turn_rate)
-        self._progress = ProgressChecker(_PROGRESS * scene.size, patience)
+        self._progress = ProgressChecker(decrease_by(_PROGRESS * scene.size), patience)
 
     def command(self, scene: PushScene, held: float) -> Twist | None:
         """The velocity to drive now; None where the object has been lost or does not get on.
