@@ -19,6 +19,7 @@ _PASSED = 0.12
 _BESIDE = 0.03
 """Distances at which a point that lies behind, or abeam, counts as reached [circumscribed radii]:
 to turn for so little could sweep into something."""
+_NEAR = 0.02  # distance at which a point is reached by default [circumscribed radii]
 _SURE = 8.0  # distance from which on the bearing of a point is steered by [`near`]
 LITTLE_TURN = 0.6
 """A turn by less is not made the longer way [rad]."""
@@ -76,7 +77,7 @@ class LegFollower:
         escapes: how often it may make room for a turn that something stops.
 
     Attributes:
-        arrived: whether it stands at the end.
+        arrived: True when it stands at the end.
         steady: for how long the last command stays right if the robot follows it exactly [s].
     """
 
@@ -93,7 +94,8 @@ class LegFollower:
         self._robot = robot
         self._legs = legs
         size = robot.circumscribed_radius
-        self._near = 0.02 * size if near is None else number("near", near, low=0.0, open_low=True)
+        near = _NEAR * size if near is None else near
+        self._near = number("near", near, low=0.0, open_low=True)
         self._aligned = number("aligned", aligned, low=0.0, open_low=True)
         self._response = number("response", response, low=0.0, open_low=True)
         self._escapes = escapes
@@ -128,7 +130,7 @@ class LegFollower:
             pose: (3,) x, y [m], theta [rad] of the robot now.
             time: [s].
             held: for how long the command will be held [s].
-            stopped: whether something is known to stop the robot.
+            stopped: something is known to stop the robot.
 
         Raises:
             InvalidInputError: if the pose is not finite.

@@ -49,7 +49,9 @@ def arc_twist(robot: RobotModel, length: float, turn: float, least: float = 0.0)
         length / robot.min_speed if robot.min_speed < 0.0 else 0.0,
         abs(turn) / robot.max_turn_rate,
     )
-    return clamp_twist(robot, length / seconds, turn / seconds) if seconds else Twist(0.0, 0.0)
+    if seconds == 0.0:
+        return Twist(0.0, 0.0)
+    return clamp_twist(robot, length / seconds, turn / seconds)
 
 
 def ramp_twist(

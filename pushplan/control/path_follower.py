@@ -53,7 +53,9 @@ class PathFollower(StagedController):
         if over and robot.can_stop:
             return self._limit(Twist(0.0, 0.0))
         ahead = progress.index(min(along + 0.5 * self._clock.held * speed, progress.total))
-        curvature = 0.0 if over else float(plan.turn_rates[ahead]) / max(plan.speeds[ahead], 1e-9)
+        curvature = 0.0
+        if not over:
+            curvature = float(plan.turn_rates[ahead]) / max(plan.speeds[ahead], 1e-9)
         offset = math.cos(path_theta) * (y - path_y) - math.sin(path_theta) * (x - path_x)
         error = (theta - path_theta + math.pi) % (2.0 * math.pi) - math.pi
         length = self.distance * size

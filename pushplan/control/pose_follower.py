@@ -54,7 +54,9 @@ class PoseFollower:
             turn = math.remainder(float(target[2] - pose[2]), math.tau)
             moves = float(c * (target[0] - before[0]) + s * (target[1] - before[1]))
             turns = abs(float(target[2] - before[2]))
-            off = ahead * math.copysign(1.0, moves) if moves else size * abs(turn)
+            off = size * abs(turn)
+            if moves:
+                off = ahead * math.copysign(1.0, moves)
             if self._progress is None:
                 lasts = abs(moves) / robot.max_speed + turns / robot.max_turn_rate
                 patience = _PATIENCE * max(lasts, 2.0 * seconds)
@@ -63,7 +65,8 @@ class PoseFollower:
                 self._next += 1
                 self._progress = None
                 continue
-            turn += (aside / size) * math.copysign(1.0, ahead) if moves else 0.0
+            if moves:
+                turn += (aside / size) * math.copysign(1.0, ahead)
             command = arc_twist(robot, ahead, turn, seconds)
             self._stall.send(command)
             return command

@@ -38,9 +38,9 @@ class Recovery:
         distance: to get away by [m]; a turn by 1 rad is as good.
         skip: how many ways to leave to the end, because they have not helped before.
         response: time in which an error from the path is driven off [s].
-        looks: whether ways into what is static are left out; else a way is tried until something
-            stops the robot. Objects are never looked at: backing away from them frees a jam.
-        searches: whether a path is searched where no way is left.
+        looks: leave out ways into what is static; else a way is tried until something stops the
+            robot. Objects are never looked at: backing away from them frees a jam.
+        searches: search a path where no way is left.
     """
 
     def __init__(

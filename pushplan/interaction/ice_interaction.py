@@ -123,7 +123,9 @@ class IceInteraction(CheckedFields):
     def settings(self, world: World) -> IceSettings:
         """The numerical settings for the sizes in this world."""
         radii = world.movables.radii
-        size = float(np.median(radii)) if len(radii) else world.robot.circumscribed_radius
+        size = world.robot.circumscribed_radius
+        if len(radii):
+            size = float(np.median(radii))
         step = self.step * size
         return IceSettings(step, self.iterations, self.hull_friction, self.friction, STILL * step)
 

@@ -73,7 +73,9 @@ last; (N, K, 3) for the objects at each pose; and (N - 1,) for the work from eac
 
 def default_interaction(world: World) -> InteractionModel:
     """`IceInteraction` in open water, `QuasiStatic` where there are walls."""
-    return QuasiStatic(friction=1.0) if world.static.convex_parts else IceInteraction()
+    if world.static.convex_parts:
+        return QuasiStatic(friction=1.0)
+    return IceInteraction()
 
 
 def path_sweeper(world: World, interaction: InteractionModel | None = None) -> PathSweeper:
@@ -81,7 +83,9 @@ def path_sweeper(world: World, interaction: InteractionModel | None = None) -> P
 
     A model that has no kernels is asked anew for each portion.
     """
-    model = default_interaction(world) if interaction is None else interaction
+    model = interaction
+    if model is None:
+        model = default_interaction(world)
     masses = owned(world.movables.masses)
     if isinstance(model, IceInteraction):
         ice = model.bodies(world)

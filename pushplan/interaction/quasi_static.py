@@ -183,7 +183,7 @@ def _bodies(robot: RobotModel, shapes: _Shapes, static: StaticMap, gyration: flo
         offsets=owned(movables.offsets),
         radii=owned(movables.radii),
         inverse_masses=1.0 / movables.masses,
-        inverse_gyration=1.0 / (np.array(squares) * gyration**2) if squares else np.zeros(0),
+        inverse_gyration=1.0 / (np.array(squares, dtype=np.float64) * gyration**2),
         static_vertices=owned(vertices),
         static_offsets=owned(offsets),
         static_boxes=outline_boxes(vertices, offsets),

@@ -52,7 +52,9 @@ def footprint(robot: RobotModel, margin: float = 0.0) -> Footprint:
 
 def obstacles(static: StaticMap, outlines: Sequence[FloatArray] = ()) -> ConvexObstacles:
     """Everything static, and further convex outlines in the world frame."""
-    return _obstacles(static, (*static.convex_parts, *outlines)) if outlines else _walls(static)
+    if not outlines:
+        return _walls(static)
+    return _obstacles(static, (*static.convex_parts, *outlines))
 
 
 @functools.lru_cache(maxsize=32)

@@ -128,7 +128,10 @@ class PathImprover:
         if self.relaxed < 2:
             return
         if self.relaxed >= 4:
-            self._set_margin(0.4 * self._margin if self._margin > 0.01 * self.size else 0.0)
+            margin = 0.4 * self._margin
+            if self._margin <= 0.01 * self.size:
+                margin = 0.0
+            self._set_margin(margin)
         radius = self.world.robot.turning_radius
         if self.world.robot.drive is Drive.DIFFERENTIAL:
             radius = 0.5 * self.problem.turning_radius

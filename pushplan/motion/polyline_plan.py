@@ -78,4 +78,6 @@ def polyline_status(world: World, plan: Plan) -> PlanStatus:
     walls = obstacles(world.static)
     shape = footprint(robot)
     free = first_blocked(dense, len(dense), shape, walls, np.empty_like(shape.vertices))
-    return PlanStatus.SOLVED if free == len(dense) else PlanStatus.PATH_ONLY
+    if free < len(dense):
+        return PlanStatus.PATH_ONLY
+    return PlanStatus.SOLVED

@@ -144,7 +144,10 @@ def recovery_path(world: World, margin: float) -> FloatArray | None:
         steps = np.concatenate([steps, steps * (-1.0, 1.0)])
     steps = np.concatenate([steps, [(0.0, STEP), (0.0, -STEP)]])
     body = footprint(world.robot)
-    for among in (obstacles(world.static, objects), walls) if objects else (walls,):
+    surroundings = [walls]
+    if objects:  # it pushes them only where there is no way between them
+        surroundings.insert(0, obstacles(world.static, objects))
+    for among in surroundings:
         if can_turn(start, size, among):
             return None
         for distance in dict.fromkeys((margin, 0.0)):

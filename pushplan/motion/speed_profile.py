@@ -162,7 +162,9 @@ def _eased(
     if world.robot_twist is not None:
         vx, vy, omega = (float(value) for value in world.robot_twist)
         theta = float(world.robot_pose[2])
-        now = omega if spot[0] else vx * math.cos(theta) + vy * math.sin(theta)
+        now = vx * math.cos(theta) + vy * math.sin(theta)
+        if spot[0]:
+            now = omega
         now = max(now * float(np.sign(rates[0])), 0.0)
         limits[0] = min(limits[0], _after(now, 0.5 * most[0] * extents[0]))
     found = limits.tolist()

@@ -248,7 +248,9 @@ class AStar:
     @property
     def cost(self) -> float:
         """Cost of the path to the goal, infinite before it is reached."""
-        return float(self.state.costs[self.goal]) if self.goal >= 0 else float("inf")
+        if self.goal < 0:
+            return np.inf
+        return float(self.state.costs[self.goal])
 
     def path(self, node: int | None = None) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Nodes from a start to ``node``, by default the goal, and the labels of the edges.

@@ -204,7 +204,7 @@ def send(horizon: Horizon, v: float, w: float, held: float, ramps: bool, out: Fl
         v: wanted speed [m/s].
         w: wanted turn rate [rad/s].
         held: time for which it is held [s].
-        ramps: whether the accelerations limit it too.
+        ramps: keep within the accelerations too.
         out: (2,) speed and turn rate.
     """
     limits = horizon.limits

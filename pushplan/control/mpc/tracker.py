@@ -57,8 +57,9 @@ class MpcTracker(StagedController):
     @property
     def fallbacks(self) -> int:
         """Calls since the start of the episode in which the solver gave no solution."""
-        now = 0 if self._memory is None else int(self._memory.horizon.counts[FAILED])
-        return self._earlier + now
+        if self._memory is None:
+            return self._earlier
+        return self._earlier + int(self._memory.horizon.counts[FAILED])
 
     def reset(self, world: World) -> None:
         """See `pushplan.world.Controller`."""

@@ -51,7 +51,9 @@ class KeyholeEnd:
 
     def chain(self) -> list[KeyholeEnd]:
         """The scenes that have led to this one, from the start on."""
-        return [self] if self.before is None else [*self.before.chain(), self]
+        if self.before is None:
+            return [self]
+        return [*self.before.chain(), self]
 
 
 def _straight(pose: FloatArray, along: FloatArray) -> FloatArray:

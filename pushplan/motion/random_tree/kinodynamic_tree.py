@@ -114,7 +114,7 @@ class TreeGrowth:
 
         Args:
             seed: of OMPL's generator, positive.
-            done: whether to end.
+            done: returns True when it has to end.
             stopped: asked while another thread uses OMPL.
 
         Returns:

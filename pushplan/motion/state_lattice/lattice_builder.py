@@ -125,7 +125,8 @@ class LatticeBuilder:
         # the ends of a primitive may lie beyond the line, and behind the robot where it turns
         beyond = math.ceil(float(self.motions.lengths.max())) + 1
         behind = beyond if abs(self.heading) > 1.0 else 1
-        behind += math.ceil(2.0 * self.radius / self.step) if abs(self.heading) > 1.5 else 0
+        if abs(self.heading) > 1.5:
+            behind += math.ceil(2.0 * self.radius / self.step)
         far = self.ahead + beyond + behind
         return min(behind, -low[0]), math.ceil(self.ahead) + beyond, far
 
