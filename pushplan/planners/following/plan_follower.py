@@ -3,36 +3,32 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
 
 from pushplan.control import EpisodeClock, ImmediateExecutor, waiting_twist
 from pushplan.control.limits import driven_twist, ramp_twist
 from pushplan.control.stopping import stopping_path
-from pushplan.control.tracking import Progress
 from pushplan.interaction import InteractionModel, QuasiStatic
 from pushplan.planners.following.plan_controller import PlanController
-from pushplan.planners.following.recovery_timing import FruitlessCalls, RecoveryRule
-from pushplan.planners.following.replanning import (
-    Reason,
-    Replanning,
-    cost_of_rest,
-    free_length,
-    rest_of,
-    sweep_rest,
+from pushplan.planners.following.plan_fit import PlanFit, reaction_length
+from pushplan.planners.following.planning_call import (
+    PendingPlan,
+    PreparedPlanner,
+    timed_call,
+    without_predictions,
 )
-from pushplan.planners.following.splicing import joined, passed, world_ahead
+from pushplan.planners.following.recovery_timing import FruitlessCalls, RecoveryRule
+from pushplan.planners.following.replanning import Reason, Replanning
+from pushplan.planners.following.splicing import world_ahead
 from pushplan.world import (
     Controller,
     GoalDisc,
     GoalLine,
     InvalidInputError,
-    PendingResult,
     Plan,
     Planner,
     PlanningExecutor,
@@ -43,36 +39,11 @@ from pushplan.world import (
     Twist,
     World,
 )
-from pushplan.world.checks import expect
-from pushplan.world.polyline import path_lengths
 
 _PERIOD = 0.1  # for which the first command is taken to be held [s]
-_NEAR = 3  # so many poses ahead a jam lets nothing wait
 _AT_ONCE = 3  # calls without a plan at one place, after which a jam waits too
 _CLOSED = (PlanStatus.GOAL_UNREACHABLE, PlanStatus.WAY_CLOSED)
 _PAUSE = 0.1  # between two plans, of the time for which the robot has not got on
-
-
-@runtime_checkable
-class PreparedPlanner(Protocol):
-    """A planner that makes what depends on the robot alone before its first call."""
-
-    def prepare(self, world: World) -> None:
-        """Make it; it is kept."""
-        ...
-
-
-@dataclass(frozen=True)
-class _PendingPlan:
-    """A planning call whose plan may not be there yet."""
-
-    call: PendingResult[PlanResult]
-    start: World
-    """The snapshot that it plans from."""
-    stretch: Plan | None
-    reason: Reason
-    made: float
-    """When it was asked for, by the clock of the world [s]."""
 
 
 class PlanFollower:
@@ -121,7 +92,7 @@ class PlanFollower:
             self._model_of = interaction
         self.stop = stop
         self._begun = False
-        self._progress: Progress
+        self._fit: PlanFit
         self._recovery: RecoveryRule
         self._forget(np.random.default_rng(0))
 
@@ -135,7 +106,7 @@ class PlanFollower:
         self.controller.reset(world)
         self._clock.command = driven_twist(world)
         self._begun = True
-        self._progress = Progress(window=2.0 * world.robot.circumscribed_radius)
+        self._fit = PlanFit(world.robot, self.replanning)
         self._recovery = RecoveryRule(world)
 
     def plan_with(self, executor: PlanningExecutor) -> None:
@@ -148,15 +119,12 @@ class PlanFollower:
         self.current_plan: Plan | None = None
         self.plan_with(ImmediateExecutor())
         self._clock = EpisodeClock(_PERIOD)
-        self._pending: _PendingPlan | None = None
+        self._pending: PendingPlan | None = None
         self._rng = rng
         self._planned: World | None = None
         """The snapshot that was there when a plan was last asked for."""
-        self._tight = False
         self._map: StaticMap | None = None
         self._map_has_changed = False
-        self._fits: StaticMap | None = None
-        """Static map that the present plan is known to be clear of."""
         self._fruitless = FruitlessCalls()
 
     @property
@@ -192,15 +160,13 @@ class PlanFollower:
             away = self._recover(world)
         if away is not None:
             return away
-        if self.current_plan is None or self._is_past(world, self.current_plan):
+        plan = self.current_plan
+        if plan is None:
             return waiting_twist(world)
-        return self.controller.command(world, self.current_plan)
-
-    def _is_past(self, world: World, plan: Plan) -> bool:
-        """Return True if a robot that cannot stop is at the end of its plan, the next pending."""
-        if world.robot.can_stop or self._pending is None:
-            return False
-        return self._progress.update(plan, world.robot_pose) >= self._progress.total - 1e-9
+        stops_at_end = world.robot.can_stop or self._pending is None
+        if not stops_at_end and self._fit.is_used_up(world, plan):
+            return waiting_twist(world)
+        return self.controller.command(world, plan)
 
     def _update_plan(self, world: World) -> None:
         """Ask for a plan where one is wanted, and take up the one that is there."""
@@ -242,8 +208,7 @@ class PlanFollower:
         plan = self.current_plan
         now = 0.0
         if plan is not None and latency > 0.0:
-            self._progress.update(plan, world.robot_pose)
-            now = self._progress.time
+            now = self._fit.time_on(world, plan)
         if plan is None and reason is Reason.BLOCKED:
             held = self._clock.held
             path = stopping_path(world.robot, world.robot_pose, driven_twist(world), held, held)
@@ -251,9 +216,9 @@ class PlanFollower:
         start, stretch = world_ahead(world, plan, now, latency, self.interaction)
         self._planned = world
         call = self._executor.submit(
-            partial(_timed_call, self.planner, start, self._rng), world.time, self.stop
+            partial(timed_call, self.planner, start, self._rng), world.time, self.stop
         )
-        self._pending = _PendingPlan(call, start, stretch, reason, world.time)
+        self._pending = PendingPlan(call, start, stretch, reason, world.time)
 
     def _receive(self, world: World) -> None:
         """Take up a plan that is there."""
@@ -263,7 +228,7 @@ class PlanFollower:
         self._pending = None
         result = pending.call.result()
         if self.plan_log:
-            self.plan_log[-1] = _without_predictions(self.plan_log[-1])
+            self.plan_log[-1] = without_predictions(self.plan_log[-1])
         self.plan_log.append(result)
         if result.plan is None:
             self._fruitless.add(world)
@@ -271,46 +236,24 @@ class PlanFollower:
                 self.current_plan = None
             return
         self._fruitless.clear()
-        _check(result.plan, pending.start)
-        new = joined(pending.stretch, result.plan)
-        if world.time > pending.made:
-            new = rest_of(new, passed(world, new, world.time - pending.made), None)
-        if self._keeps_old(world, new, pending.reason):
-            return
-        self.current_plan = new
-        self._fits = pending.start.static
-        self._tight = result.stats.detail.get("tight", 0.0) > 0.0
-
-    def _keeps_old(self, world: World, new: Plan, reason: Reason) -> bool:
-        """Return True if the new plan is not enough better than the rest of the old one."""
+        new = pending.from_now_on(result.plan, world)
         old = self.current_plan
-        margin = self.replanning.margin
-        if margin is None or reason.urgent or old is None:
-            return False
-        if self._free_length(world, old) < math.inf:
-            return False
-        index = self._progress.index(self._progress.along)
-        weight = self.replanning.weight(self.planner)
-        swept, path = sweep_rest(world, old, index, self.interaction)
-        old_cost = cost_of_rest(world, path, swept, weight)
-        swept_new, path = sweep_rest(world, new, 0, self.interaction)
-        new_cost = cost_of_rest(world, path, swept_new, weight)
-        robot = world.robot
-        if new_cost < old_cost - margin * robot.circumscribed_radius * robot.mass:
-            return False
-        if np.isinf(old_cost):
-            return False
-        # what is expected of it from now on
-        self.current_plan = rest_of(old, index, swept.object_poses)
-        self._progress.update(self.current_plan, world.robot_pose)
-        return True
+        if old is not None and not pending.reason.urgent:
+            weight = self.replanning.weight(self.planner)
+            rest = self._fit.rest_unless_cheaper(world, old, new, self.interaction, weight)
+            if rest is not None:
+                self.current_plan = rest
+                return
+        self.current_plan = new
+        tight = result.stats.detail.get("tight", 0.0) > 0.0
+        self._fit.take_up(pending.start.static, tight=tight)
 
     def _needs_plan(self, world: World) -> Reason | None:
         plan = self.current_plan
         rule = self.replanning
-        size = world.robot.circumscribed_radius
         planned = self._planned
         waited = math.inf if planned is None else world.time - planned.time
+        size = world.robot.circumscribed_radius
         pause = rule.interval * size / world.robot.max_speed * self._fruitless.delay(world)
         # a robot that stays stuck thinks less and less often, so that the episode ends in time
         pause = max(pause, _PAUSE * self._recovery.idle)
@@ -319,115 +262,26 @@ class PlanFollower:
             return Reason.NO_PLAN if rested else None
         if not (rule.never or np.array_equal(world.movables.ids, planned.movables.ids)):
             return Reason.OBJECTS  # something was delivered, lost or found
-        left = self._free_length(world, plan)
-        if left <= self._reaction(world):
+        at_once = self._fruitless.count(world) < _AT_ONCE
+        left = self._fit.free_length(world, plan)
+        if left <= reaction_length(world, self._latency()):
             if world.robot.can_stop:
                 self.current_plan = None  # it brakes at once
                 return Reason.BLOCKED
-            return Reason.BLOCKED if rested or self._fruitless.count(world) < _AT_ONCE else None
+            return Reason.BLOCKED if rested or at_once else None
         if rested and left < math.inf:
             return Reason.JAM
         if rule.never:
             return None
-        x, y = (float(value) for value in world.robot_pose[:2])
-        along = self._progress.update(plan, world.robot_pose)
-        index = self._progress.index(along)
-        here = self._progress.pose(along)
-        if rested and np.hypot(x - here[0], y - here[1]) > rule.offset * size:
-            return Reason.OFFSET
-        if along >= self._progress.total - 1e-9:
-            return Reason.USED_UP if rested else None
-        if self._tight and waited >= 4.0 * pause:
-            return Reason.TIGHT  # there may be a plan that keeps its distance
-        driven = np.hypot(*(world.robot_pose[:2] - planned.robot_pose[:2]))
-        if waited >= rule.every_seconds - 1e-9 or driven >= rule.renewal * size:
-            return Reason.PERIOD
-        end = None
-        if np.isfinite(rule.look_ahead):
-            end = self._progress.index(along + rule.look_ahead * size) + 2
-        return self._surprise(world, plan, slice(index, end), rested)
-
-    def _free_length(self, world: World, plan: Plan) -> float:
-        """Return the length of the plan's rest before static obstacles that are new to it [m]."""
-        if self._fits is world.static:
-            return math.inf
-        index = self._progress.index(self._progress.update(plan, world.robot_pose))
-        path = np.concatenate([world.robot_pose[None], plan.poses[index + 1 :]])
-        free = math.inf if self._fits == world.static else free_length(world, path)
-        if free == math.inf:
-            self._fits = world.static
-        return free
-
-    def _reaction(self, world: World) -> float:
-        """Return the distance driven until a plan that is asked for now can be followed [m]."""
-        robot = world.robot
-        speed = abs(driven_twist(world).linear)
-        braking = 0.5 * speed * speed / robot.max_acceleration
-        return self._latency() * speed + braking + robot.circumscribed_radius
+        at_once = at_once and self._recovery.idle <= self._recovery.patience
+        return self._fit.reason(world, plan, planned, self.interaction, pause, at_once)
 
     def _latency(self) -> float:
         """Time that the next planning call will take [s]."""
         latency = self.replanning.latency
-        return self._executor.expected(self.stop) if latency is None else latency
-
-    def _surprise(self, world: World, plan: Plan, part: slice, rested: bool) -> Reason | None:
-        """Return a reason to replan if a part of the plan would not do what was predicted."""
-        surprise = self.replanning.surprise
-        if np.isinf(surprise) and not world.static.convex_parts:
-            return None  # nothing can jam
-        predicted = plan.object_poses
-        if predicted is None or predicted.shape[1] != len(world.movables) or not predicted.size:
-            return None
-        now, _ = sweep_rest(world, plan, part.start, self.interaction, part.stop)
-        if now.jammed_at >= 0:
-            if now.jammed_at > _NEAR:
-                return Reason.JAM if rested else None
-            gets_on = self._recovery.idle <= self._recovery.patience
-            at_once = gets_on and self._fruitless.count(world) < _AT_ONCE
-            return Reason.BLOCKED if rested or at_once else None
-        expected = float(path_lengths(predicted[part]) @ world.movables.masses)
-        allowed = surprise * world.robot.circumscribed_radius * world.robot.mass
-        return Reason.SURPRISE if rested and now.work - expected > allowed else None
-
-
-def _timed_call(
-    planner: Planner, start: World, rng: np.random.Generator, stop: Stop | None
-) -> PlanResult:
-    """Return the result of a planner, with the time that it took by our clock."""
-    began = time.perf_counter()
-    result = planner.plan(start, stop=stop, rng=rng)
-    took = time.perf_counter() - began
-    result = expect("what the planner returns", result, PlanResult)
-    return replace(result, stats=replace(result.stats, wall_time_s=took))
-
-
-def _without_predictions(result: PlanResult) -> PlanResult:
-    """The same result without the objects' predicted poses, which take most of its memory."""
-    if result.plan is None or result.plan.object_poses is None:
-        return result
-    return replace(result, plan=replace(result.plan, object_poses=None))
-
-
-def _check(plan: Plan, start: World) -> None:
-    """Refuse a plan that is not one for this snapshot.
-
-    Raises:
-        InvalidInputError: if it begins elsewhere, or predicts other objects.
-    """
-    (x, y) = plan.poses[0, :2].tolist()
-    (x0, y0) = start.robot_pose[:2].tolist()
-    most = start.robot.circumscribed_radius
-    if math.hypot(x - x0, y - y0) > most:
-        raise InvalidInputError(
-            f"plan.poses must begin within {most:g} m of the robot, which is at [{x0:g}, {y0:g}], "
-            f"got [{x:g}, {y:g}]"
-        )
-    count = len(start.movables)
-    if plan.object_poses is not None and plan.object_poses.shape[1] != count:
-        raise InvalidInputError(
-            f"plan.object_poses must be ({len(plan.poses)}, {count}, 3) for the {count} objects of "
-            f"the world, got {plan.object_poses.shape}"
-        )
+        if latency is None:
+            return self._executor.expected(self.stop)
+        return latency
 
 
 def policy_for(planner: Planner) -> PlanFollower:

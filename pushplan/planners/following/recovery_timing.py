@@ -111,7 +111,9 @@ class FruitlessCalls:
     def count(self, world: World) -> int:
         """Number of calls in a row that have found no plan since the robot is at this place."""
         away = math.dist(world.robot_pose[:2].tolist(), self._place)
-        return self._count if away <= _HERE * world.robot.circumscribed_radius else 0
+        if away <= _HERE * world.robot.circumscribed_radius:
+            return self._count
+        return 0
 
     def delay(self, world: World) -> float:
         """Factor of the time before the next call; planners without randomness search the same."""

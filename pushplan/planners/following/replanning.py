@@ -152,7 +152,9 @@ def free_length(world: World, path: FloatArray) -> float:
     shape = footprint(world.robot, 0.5 * world.margin)
     scratch = np.empty_like(shape.vertices)
     first = first_blocked(poses, len(fine), shape, obstacles(world.static), scratch)
-    return math.inf if first == len(fine) else float(np.interp(fine[first], along, lengths))
+    if first == len(fine):
+        return math.inf
+    return float(np.interp(fine[first], along, lengths))
 
 
 def cost_of_rest(world: World, path: FloatArray, swept: Interaction, weight: float) -> float:

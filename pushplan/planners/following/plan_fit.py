@@ -1,0 +1,183 @@
+"""`PlanFit`: how well the plan that is driven fits the world as it is now."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pushplan.control.limits import driven_twist
+from pushplan.control.tracking import Progress
+from pushplan.interaction import InteractionModel
+from pushplan.planners.following.replanning import (
+    Reason,
+    Replanning,
+    cost_of_rest,
+    free_length,
+    rest_of,
+    sweep_rest,
+)
+from pushplan.world import Plan, RobotModel, StaticMap, World
+from pushplan.world.polyline import path_lengths
+
+_NEAR = 3  # so many poses ahead a jam lets nothing wait
+_TIGHT_PAUSES = 4.0  # after which a tight plan is made anew
+
+
+class PlanFit:
+    """Knows where on its plan a robot is, and compares the rest of the plan with the world.
+
+    Args:
+        robot: that drives the plan.
+        rule: differences that ask for a new plan.
+    """
+
+    def __init__(self, robot: RobotModel, rule: Replanning) -> None:
+        self._rule = rule
+        self._progress = Progress(window=2.0 * robot.circumscribed_radius)
+        self._clear_of: StaticMap | None = None
+        """Static map that the present plan is known to be clear of."""
+        self._tight = False
+
+    def take_up(self, static: StaticMap, *, tight: bool) -> None:
+        """Begin with another plan.
+
+        Args:
+            static: what it was planned for.
+            tight: the plan uses the whole turn rate, or keeps little distance.
+        """
+        self._clear_of = static
+        self._tight = tight
+
+    def time_on(self, world: World, plan: Plan) -> float:
+        """Time of the plan at the robot's place [s]."""
+        self._progress.update(plan, world.robot_pose)
+        return self._progress.time
+
+    def is_used_up(self, world: World, plan: Plan) -> bool:
+        """Return True if the robot is at the end of the plan."""
+        return self._progress.update(plan, world.robot_pose) >= self._progress.total - 1e-9
+
+    def free_length(self, world: World, plan: Plan) -> float:
+        """Length of the plan's rest before static obstacles that are new to it [m]."""
+        if self._clear_of is world.static:
+            return math.inf
+        index = self._progress.index(self._progress.update(plan, world.robot_pose))
+        free = math.inf
+        if self._clear_of != world.static:
+            path = np.concatenate([world.robot_pose[None], plan.poses[index + 1 :]])
+            free = free_length(world, path)
+        if free == math.inf:
+            self._clear_of = world.static
+        return free
+
+    def rest_unless_cheaper(
+        self, world: World, old: Plan, new: Plan, interaction: InteractionModel, weight: float
+    ) -> Plan | None:
+        """The rest of the present plan as it is predicted now; None if a new plan replaces it.
+
+        Args:
+            world: the scene now.
+            old: the present plan.
+            new: another one.
+            interaction: predicts the objects.
+            weight: of interaction, w.
+        """
+        margin = self._rule.margin
+        if margin is None or self.free_length(world, old) < math.inf:
+            return None
+        robot = world.robot
+        index = self._progress.index(self._progress.along)
+        swept, path = sweep_rest(world, old, index, interaction)
+        old_cost = cost_of_rest(world, path, swept, weight)
+        swept_new, path = sweep_rest(world, new, 0, interaction)
+        new_cost = cost_of_rest(world, path, swept_new, weight)
+        if new_cost < old_cost - margin * robot.circumscribed_radius * robot.mass:
+            return None
+        if np.isinf(old_cost):
+            return None
+        # what is expected of it from now on
+        rest = rest_of(old, index, swept.object_poses)
+        self._progress.update(rest, world.robot_pose)
+        return rest
+
+    def reason(
+        self,
+        world: World,
+        plan: Plan,
+        planned: World,
+        interaction: InteractionModel,
+        pause: float,
+        at_once: bool,
+    ) -> Reason | None:
+        """A reason to replace a plan that keeps clear of what is static.
+
+        Args:
+            world: the scene now.
+            plan: the present plan.
+            planned: the scene when a plan was last asked for.
+            interaction: predicts the objects.
+            pause: least time between two plans for the same reason [s].
+            at_once: a jam right ahead does not wait for the pause.
+        """
+        rule = self._rule
+        size = world.robot.circumscribed_radius
+        waited = world.time - planned.time
+        rested = waited >= pause - 1e-9
+        x, y = (float(value) for value in world.robot_pose[:2])
+        along = self._progress.update(plan, world.robot_pose)
+        index = self._progress.index(along)
+        here = self._progress.pose(along)
+        if rested and np.hypot(x - here[0], y - here[1]) > rule.offset * size:
+            return Reason.OFFSET
+        if along >= self._progress.total - 1e-9:
+            return Reason.USED_UP if rested else None
+        if self._tight and waited >= _TIGHT_PAUSES * pause:
+            return Reason.TIGHT  # there may be a plan that keeps its distance
+        driven = np.hypot(*(world.robot_pose[:2] - planned.robot_pose[:2]))
+        if waited >= rule.every_seconds - 1e-9 or driven >= rule.renewal * size:
+            return Reason.PERIOD
+        end = None
+        if np.isfinite(rule.look_ahead):
+            end = self._progress.index(along + rule.look_ahead * size) + 2
+        return self._surprise(world, plan, slice(index, end), interaction, rested, at_once)
+
+    def _surprise(
+        self,
+        world: World,
+        plan: Plan,
+        part: slice,
+        interaction: InteractionModel,
+        rested: bool,
+        at_once: bool,
+    ) -> Reason | None:
+        """A reason to replan if a part of the plan would not do what was predicted."""
+        surprise = self._rule.surprise
+        if np.isinf(surprise) and not world.static.convex_parts:
+            return None  # nothing can jam
+        predicted = plan.object_poses
+        if predicted is None or predicted.shape[1] != len(world.movables) or not predicted.size:
+            return None
+        now, _ = sweep_rest(world, plan, part.start, interaction, part.stop)
+        if now.jammed_at > _NEAR:
+            return Reason.JAM if rested else None
+        if now.jammed_at >= 0:
+            return Reason.BLOCKED if rested or at_once else None
+        expected = float(path_lengths(predicted[part]) @ world.movables.masses)
+        allowed = surprise * world.robot.circumscribed_radius * world.robot.mass
+        if rested and now.work - expected > allowed:
+            return Reason.SURPRISE
+        return None
+
+
+def reaction_length(world: World, latency: float) -> float:
+    """Distance driven until a plan that is asked for now can be followed [m].
+
+    Args:
+        world: the scene now.
+        latency: time that the planning call takes [s].
+    """
+    robot = world.robot
+    speed = abs(driven_twist(world).linear)
+    braking = 0.5 * speed * speed / robot.max_acceleration
+    return latency * speed + braking + robot.circumscribed_radius
