@@ -15,6 +15,7 @@ from pushplan.geometry import VisibilityGraph
 from pushplan.motion.dubins import dubins
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_improver import PathImprover
+from pushplan.motion.path_search_config import EDGE, INSET
 from pushplan.world import GoalDisc, NavigationGoal, World
 from pushplan.world.checks import FloatArray
 
@@ -27,14 +28,14 @@ _SHARP = 0.8
 def is_far(improver: PathImprover) -> bool:
     """Return True if the goal is more edges of a tree away than one grows in some milliseconds."""
     away = improver.goal.distance(*improver.world.robot_pose[:2])
-    return bool(away > _FAR * improver.config.edge * improver.size)
+    return bool(away > _FAR * EDGE * improver.size)
 
 
 def warm_start(improver: PathImprover) -> None:
     """Try to drive along the shortest homotopic path, objects or not; the improver keeps it."""
     problem = improver.problem
     size = improver.size
-    depth = 1.01 * improver.config.inset * size
+    depth = 1.01 * INSET * size
     if isinstance(improver.goal, GoalDisc):
         depth = improver.goal.radius - 0.99 * float(problem.goal[3])
     radius = problem.turning_radius

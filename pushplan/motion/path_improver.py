@@ -17,7 +17,13 @@ from pushplan.motion.dubins import step_along
 from pushplan.motion.goal_region import goal_numbers
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_problem import PathProblem, SweptPath, make_swept_path
-from pushplan.motion.path_search_config import PathSearchConfig
+from pushplan.motion.path_search_config import (
+    BATCH,
+    INSET,
+    SHORTCUTS,
+    SPACING,
+    PathSearchConfig,
+)
 from pushplan.motion.room_ahead import Room
 from pushplan.motion.shortcutting import shortcut
 from pushplan.motion.speed_profile import TIGHTEST, goal_is_outside, start_margin, timed_plan
@@ -80,16 +86,16 @@ class PathImprover:
             robot_mass=world.robot.mass,
             push_weight=float(config.push_weight),
             turning_radius=turning_radius,
-            spacing=config.spacing * self.size,
+            spacing=SPACING * self.size,
             jam_length=self._jam_length(),
             displacement=1.5 * self.size,
-            goal=goal_numbers(self.goal, config.inset * self.size),
+            goal=goal_numbers(self.goal, INSET * self.size),
             footprint=footprint(world.robot),
             walls=obstacles(keep_out(world)),
             contacts=compile_interaction(interaction, world),
         )
         # crowded worlds are slow to sweep: look at the stop rule more often
-        self._batch = max(1, 10 * config.batch // (10 + len(world.movables)))
+        self._batch = max(1, 10 * BATCH // (10 + len(world.movables)))
         self._call = call
         self._margin = 0.0
         self._shortcut_pace = Pace()
@@ -141,7 +147,7 @@ class PathImprover:
     def _set_margin(self, margin: float) -> None:
         """Keep ``margin`` [m] from walls; with little of it poses lie closer, for what is thin."""
         self._margin = margin
-        spacing = self.config.spacing * self.size
+        spacing = SPACING * self.size
         if margin < _THIN_MARGIN * self.size:
             spacing = min(spacing, max(2.0 * margin, _LEAST_SPACING * self.size))
         shape = footprint(self.world.robot, margin)
@@ -230,8 +236,8 @@ class PathImprover:
         return cost if swept == count else None
 
     def shortcut(self, candidate: Candidate) -> None:
-        """Try ``config.shortcuts`` shortcuts, as long as the stop rule allows."""
-        for _ in range(0, self.config.shortcuts, self._batch):
+        """Try `SHORTCUTS` shortcuts, as long as the stop rule allows."""
+        for _ in range(0, SHORTCUTS, self._batch):
             if self.stopped():
                 return
             draws = self.rng.random((self._batch, 4))

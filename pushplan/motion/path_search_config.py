@@ -8,13 +8,22 @@ from pushplan.world.checked_fields import (
     CheckedFields,
     Fraction,
     NonNegativeFloat,
-    PositiveFloat,
     PositiveFraction,
     PositiveInt,
 )
 
+INSET = 0.05
+"""Depth in the goal at which a plan ends [R]: the robot is inside in spite of rounding."""
+SPACING = 0.15
+"""Distance between the poses of a path [R]."""
+EDGE = 1.6
+"""Longest edge of a tree [R]."""
+SHORTCUTS = 400
+"""Shortcuts tried on a path before its gain is looked at."""
+BATCH = 10
+"""Shortcuts between two looks at the stop rule; fewer among many objects, which take longer."""
 LEAST_GAIN = 0.001
-"""Fraction of its cost that a path must lose over `shortcuts` of them to be worked on further."""
+"""Fraction of its cost that a path must lose over `SHORTCUTS` to be worked on further."""
 
 
 @dataclass(frozen=True)
@@ -28,11 +37,6 @@ class PathSearchConfig(CheckedFields):
             the user's trade between E_nav and I_nav.
         margin: clearance kept from walls [R]; less where the robot starts nearer.
         turn_fraction: fraction of the greatest turn rate that plans use; the rest is for tracking.
-        inset: how far into the goal a plan ends [R].
-        spacing: distance between the poses of a path [R].
-        edge: longest edge of a tree [R].
-        shortcuts: shortcuts tried on a path before its gain is looked at.
-        batch: shortcuts between two looks at the stop rule, fewer among many objects.
         default_iterations: budget where no stop rule is given; three times as much while there is
             no plan.
     """
@@ -40,9 +44,4 @@ class PathSearchConfig(CheckedFields):
     push_weight: NonNegativeFloat = 3.0
     margin: Fraction = 0.06
     turn_fraction: PositiveFraction = 0.9
-    inset: Fraction = 0.05
-    spacing: PositiveFloat = 0.15
-    edge: PositiveFloat = 1.6
-    shortcuts: PositiveInt = 400
-    batch: PositiveInt = 10
     default_iterations: PositiveInt = 4000

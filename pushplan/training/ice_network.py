@@ -32,6 +32,11 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+_MAP_WEIGHT = 20.0
+"""Weight of the mean squared error of the occupancy against the Poisson deviance of the work.
+
+That is unbiased in the mean and allows more error where the work is more."""
+
 
 @dataclass(frozen=True)
 class IceTrainingConfig(CheckedFields):
@@ -43,9 +48,6 @@ class IceTrainingConfig(CheckedFields):
     # nothing along a cosine (one-cycle schedule)
     rate: PositiveFloat = 4e-3
     decay: NonNegativeFloat = 1e-4  # of the weights
-    # of the mean squared error of the occupancy, against the Poisson deviance of the work, which is
-    # unbiased in the mean and allows more error where the work is more
-    map_weight: PositiveFloat = 20.0
     seed: NonNegativeInt = 0  # of initial weights, order and mirroring
     threads: PositiveInt = 1  # of PyTorch; the result depends on it in the last digits
 
@@ -84,7 +86,7 @@ def train(pairs: IcePairs, config: IceTrainingConfig | None = None) -> tuple[Ice
         for step in range(steps):
             chosen = order[step * config.batch : (step + 1) * config.batch]
             mirrored = bool(torch.rand((), generator=generator) < 0.5)
-            loss = _loss(network, [x[chosen] for x in data], mirrored, config.map_weight)
+            loss = _loss(network, [x[chosen] for x in data], mirrored)
             optimizer.zero_grad(set_to_none=True)
             loss.backward()
             torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
@@ -97,7 +99,7 @@ def train(pairs: IcePairs, config: IceTrainingConfig | None = None) -> tuple[Ice
     return network, losses
 
 
-def _loss(network: IceUNet, chosen: list[Any], mirrored: bool, map_weight: float) -> Any:
+def _loss(network: IceUNet, chosen: list[Any], mirrored: bool) -> Any:
     """Error of a step: occupancy and work, of patches seen in a mirror or not."""
     patches = chosen[0].float() / LEVELS
     after = chosen[1].float() / LEVELS
@@ -107,7 +109,7 @@ def _loss(network: IceUNet, chosen: list[Any], mirrored: bool, map_weight: float
         after = after.flip(-1)
     found, effort = network(patches)
     occupancy = ((found - after) ** 2).mean()
-    return map_weight * occupancy + (effort - work * (effort + 1e-6).log()).mean()
+    return _MAP_WEIGHT * occupancy + (effort - work * (effort + 1e-6).log()).mean()
 
 
 def export(network: IceUNet, path: str | Path) -> None:

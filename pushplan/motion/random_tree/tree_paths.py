@@ -12,6 +12,7 @@ from pushplan.motion.coarse_path import coarse_path, reachable
 from pushplan.motion.collision import footprint, is_free, obstacles
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_improver import Candidate, PathImprover
+from pushplan.motion.path_search_config import EDGE
 from pushplan.motion.polyline_plan import polyline_plan
 from pushplan.motion.random_tree.kinodynamic_tree import TreeGrowth, TreeLimits
 from pushplan.motion.random_tree.targets import Targets
@@ -109,7 +110,6 @@ class TreePaths:
         improver = self._improver
         world = self._improver.world
         problem = self._improver.problem
-        config = improver.config
         size = improver.size
         self.trees += 1
         improver.iterations += 1
@@ -133,7 +133,7 @@ class TreePaths:
                     return None
                 self._exact = self._around_walls()
             coarse = self._exact
-        edges = path_length(coarse) / (config.edge * size)
+        edges = path_length(coarse) / (EDGE * size)
         last = improver.iterations + int(budget * max(1.0, edges / _EDGES))
 
         def done() -> bool:
@@ -142,7 +142,7 @@ class TreePaths:
 
         limits = TreeLimits(
             max_curvature=1.0 / problem.turning_radius,
-            edge_length=config.edge * size,
+            edge_length=EDGE * size,
             spacing=problem.spacing,
             turn_weight=0.5 * size,
             backward=improver.backward,

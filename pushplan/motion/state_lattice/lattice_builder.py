@@ -49,6 +49,8 @@ FloeCostFunction = Callable[[World, float], FloeCosts]
 _MOST_NODES = 3_000_000
 _MOST_CELLS = 1_000_000
 _FEW_COLUMNS = 256  # of the map, between two looks at a stop rule
+_STEP = 0.5  # of the lattice, about [B]; the turning radius is a whole number of steps
+_CELLS_PER_STEP = 4  # of the cost map; fewer where the map would be too large
 
 
 @dataclass(eq=False)
@@ -68,7 +70,7 @@ class LatticeBuilder:
         radius = self.radius
         robot = self.world.robot
         # the radius is a whole number of steps, so that few sets of primitives are ever needed
-        wanted = config.step * 2.0 * max(robot.inscribed_radius, 0.1 * robot.circumscribed_radius)
+        wanted = _STEP * 2.0 * max(robot.inscribed_radius, 0.1 * robot.circumscribed_radius)
         ratio = float(min(max(round(radius / wanted), 2), 40))
         self.step = radius / ratio
         goal = world.goal
@@ -81,7 +83,7 @@ class LatticeBuilder:
         self.frame = Frame.towards_goal(world)
         self.heading = self.frame.heading(float(world.robot_pose[2]))
         self._lay_out()
-        self.cells = config.cells_per_step
+        self.cells = _CELLS_PER_STEP
         while self.cells > 1 and self.rows * self.columns * self.cells**2 > _MOST_CELLS:
             self.cells -= 1
         self.cell = self.step / self.cells

@@ -13,10 +13,11 @@ from pushplan.world.checked_fields import (
     OneOf,
     PositiveFloat,
     PositiveFraction,
-    PositiveInt,
 )
 
 HEURISTICS = ("estimate", "bound")
+SPACING = 0.15
+"""Distance between the poses of a path [R]."""
 
 
 @dataclass(frozen=True)
@@ -27,12 +28,9 @@ class LatticeConfig(CheckedFields):
         headings: of the lattice, 8, 16 or 32.
         variants: primitives from one heading to another one.
         shifts: lane changes to each side.
-        step: of the lattice, about [B]; the turning radius is a whole number of steps.
-        cells_per_step: cells of the cost map in a step of the lattice.
         turn_fraction: fraction of the greatest turn rate that plans use; the rest is for tracking.
         inset: how far beyond the goal line a path ends [R].
         horizon: how far ahead a path goes at most [R].
-        spacing: distance between the poses of a path [R].
         heuristic: a "bound" below the cost to go, with which the path costs at most ``inflation``
             times the least, or an "estimate" of it, with which it is found with far fewer nodes,
             and has cost 0 to 3 % more than the least in Ship-Ice.
@@ -42,12 +40,9 @@ class LatticeConfig(CheckedFields):
     headings: int = 16
     variants: int = 2
     shifts: int = 3
-    step: PositiveFloat = 0.5
-    cells_per_step: PositiveInt = 4
     turn_fraction: PositiveFraction = 0.9
     inset: NonNegativeFloat = 0.2
     horizon: PositiveFloat = 60.0
-    spacing: PositiveFloat = 0.15
     heuristic: Annotated[str, OneOf(HEURISTICS)] = "estimate"
     inflation: Annotated[float, Limits(1.0)] = 1.2
 

@@ -9,7 +9,7 @@ from pushplan.motion.dubins import along_arc, sample_pieces
 from pushplan.motion.goal_region import goal_numbers, in_goal
 from pushplan.motion.path_problem import SweptPath
 from pushplan.motion.state_lattice.built_lattice import BuiltLattice
-from pushplan.motion.state_lattice.lattice_config import LatticeConfig
+from pushplan.motion.state_lattice.lattice_config import SPACING, LatticeConfig
 from pushplan.world import GoalLine, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import arc_lengths
@@ -36,7 +36,7 @@ def lay_path(
     The path is cut off where it reaches the goal, or the goal row of a lattice that ends before.
     """
     size = world.robot.circumscribed_radius
-    spacing = config.spacing * size
+    spacing = SPACING * size
     poses, curvatures = sample_arcs(world.robot_pose, arcs, spacing)
     goal = world.navigation_goal
     if isinstance(goal, GoalLine):

@@ -11,7 +11,7 @@ from pushplan.motion.dubins_warm_start import warm_start
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.length_bound import length_bound
 from pushplan.motion.path_improver import Candidate, PathImprover
-from pushplan.motion.path_search_config import LEAST_GAIN
+from pushplan.motion.path_search_config import INSET, LEAST_GAIN
 from pushplan.motion.random_tree.tree_paths import TreePaths
 from pushplan.motion.start_turn import start_turn
 from pushplan.planners.push_aware.best_first import Branching, make_search
@@ -29,6 +29,14 @@ _FIRST_SEARCH = 1000.0
 _COST_SIGMA = 0.7
 """Perturbation of objects' costs from one search to the next: deviation of their logarithm."""
 
+_ARC = 2.0  # length of an edge of the search [cells of the table]
+_CURVATURES = 5  # of an edge, spread evenly between the sharpest turns
+_NODES = 100_000  # nodes of one search at most
+_MEMORY = 48.0  # of the objects' poses in one search at most [MiB]
+_EXPANSIONS = 30
+"""Half the arcs driven at most between two looks at the stop rule, fewer among many objects."""
+_SLACK = 0.05
+"""Fraction by which a path of the search may cost more than the best plan before it is shortcut."""
 _RANDOM_NODES = 20_000  # nodes of a random tree at most; then another is begun
 _SIGNATURES = 4  # ways to have pushed the objects that some searches tell apart in each cell
 _LONGEST_ARC = 2.0  # longest arc of the random tree [R]
@@ -144,15 +152,14 @@ class PushAwareSearch:
         """Lengths to the goal without objects; the same for every call on this map."""
         robot = self.world.robot
         static = keep_out(self.world)
-        inset = self.config.inset * self.size
+        inset = INSET * self.size
         maker = cost_to_go_maker(robot, static, self.improver.goal, self._radius, inset)
         return maker.make(self.improver.stopped)
 
     def _first_variant(self, table: CostToGo) -> _SearchVariant:
-        config = self.config
-        inflation = max(config.heuristic_inflation, 0.5 * (1.0 + self._cost_ratio(table)))
+        inflation = max(self.config.heuristic_inflation, 0.5 * (1.0 + self._cost_ratio(table)))
         masses = owned(self.world.movables.masses)
-        return _SearchVariant(config.arc, config.curvatures, inflation, 1, masses)
+        return _SearchVariant(_ARC, _CURVATURES, inflation, 1, masses)
 
     def _random_variant(self, table: CostToGo) -> _SearchVariant:
         """Other edges, another inflation and other costs: what one search misses another finds."""
@@ -161,7 +168,7 @@ class PushAwareSearch:
         masses = self.world.movables.masses
         most = max(1.03 * config.heuristic_inflation, self._cost_ratio(table))
         return _SearchVariant(
-            arc=config.arc * float(rng.uniform(0.7, 1.5)),
+            arc=_ARC * float(rng.uniform(0.7, 1.5)),
             curvatures=int(rng.integers(1, 4)) * 2 + 1,
             inflation=float(rng.uniform(0.98 * config.heuristic_inflation, most)),
             signatures=_SIGNATURES if rng.random() < 0.1 else 1,
@@ -185,9 +192,7 @@ class PushAwareSearch:
         rows, cols, headings = table.values.shape
         cells = (rows, cols, headings, signatures)
         if self._nodes is None:
-            config = self.config
-            count = len(self.world.movables)
-            self._nodes = make_push_tree(config.nodes, count, config.memory, cells)
+            self._nodes = make_push_tree(_NODES, len(self.world.movables), _MEMORY, cells)
         if self._nodes.best.shape != cells:
             self._nodes = self._nodes._replace(best=np.empty(cells))
         return self._nodes
@@ -205,7 +210,7 @@ class PushAwareSearch:
         )
         self._plant(nodes)
         self.searches += 1
-        bound = (1.0 + self.config.slack) * improver.plan_cost
+        bound = (1.0 + _SLACK) * improver.plan_cost
         star = make_search(nodes, table, branching, bound, improver.problem)
         while not improver.stopped():
             before = int(nodes.counts[3])
@@ -228,9 +233,7 @@ class PushAwareSearch:
         world = self.world
         few = self._few()
         if self._tree is None:
-            config = self.config
-            count = min(config.nodes, _RANDOM_NODES)
-            self._tree = make_push_tree(count, len(world.movables), config.memory)
+            self._tree = make_push_tree(_RANDOM_NODES, len(world.movables), _MEMORY)
             self._plant(self._tree)
         scales = np.array([2.0 * self.size, np.pi, 2.0 * self.size * world.robot.mass])
         last = improver.iterations + arcs
@@ -254,7 +257,7 @@ class PushAwareSearch:
 
     def _few(self) -> int:
         """Arcs to drive between two looks at the stop rule."""
-        return max(1, 10 * self.config.expansions // (10 + len(self.world.movables)))
+        return max(1, 10 * _EXPANSIONS // (10 + len(self.world.movables)))
 
     def _try(self, arcs: FloatArray) -> None:
         """Shortcut the path along some arcs, where it could be a plan."""

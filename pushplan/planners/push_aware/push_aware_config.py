@@ -11,7 +11,6 @@ from pushplan.world.checked_fields import (
     Fraction,
     Limits,
     NonNegativeFloat,
-    PositiveFloat,
     PositiveFraction,
     PositiveInt,
 )
@@ -29,17 +28,8 @@ class PushAwareConfig(PathSearchConfig):
             search.
         pruning_factor: factor on that length where a path is given up because it will cost too
             much: the table is up to a tenth too long.
-        edge: longest edge of the first random tree [R].
         differential_radius: least turning radius of a differential drive [R]; less where there is
             no way with it.
-        arc: length of an edge of the search [cells of the table].
-        curvatures: how many curvatures an edge may have, spread evenly between the sharpest turns.
-        nodes: nodes of one search at most.
-        memory: of the objects' poses in one search at most [MiB].
-        expansions: half the arcs driven at most between two looks at the stop rule, fewer among
-            many objects.
-        slack: how much more than the best plan so far a path of the search may cost before it is
-            shortcut, as a fraction.
         random_fraction: fraction of the iterations that go into a random tree over poses and costs,
             which finds, in the end, what the search cannot represent.
     """
@@ -51,10 +41,4 @@ class PushAwareConfig(PathSearchConfig):
     differential_radius: Annotated[float, Limits(TIGHTEST)] = 1.0
     heuristic_inflation: NonNegativeFloat = 1.05
     pruning_factor: NonNegativeFloat = 0.92
-    arc: PositiveFloat = 2.0
-    curvatures: Annotated[int, Limits(3)] = 5
-    nodes: Annotated[int, Limits(2)] = 100_000
-    memory: PositiveFloat = 48.0
-    expansions: PositiveInt = 30
-    slack: NonNegativeFloat = 0.05
     random_fraction: NonNegativeFloat = 0.03

@@ -45,6 +45,7 @@ from pushplan.world.checks import FloatArray, IntArray, expect
 from pushplan.world.outline import convex_outline
 
 _NEARER = 1e-6  # distance by which a body within the clearance may come nearer [R]
+_SAFE_FRACTION = 0.6  # of half the bumper, within which an offset costs no more than ``offset``
 
 
 @dataclass
@@ -218,6 +219,7 @@ def _pushing_memory(
             max_speed=robot.max_speed,
             half=models[0].bumper.half,
             curvature=-1.0,
+            safe=_SAFE_FRACTION,
             **{name: getattr(config, name) for name in Weights._fields if hasattr(config, name)},
         ),
         Faces(

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 from pushplan.world import InvalidInputError
 from pushplan.world.checked_fields import (
     CheckedFields,
-    Fraction,
     Limits,
     NonNegativeFloat,
     PositiveFloat,
@@ -58,8 +57,7 @@ class PushingConfig(CheckedFields):
             than the control period, and the first is the control period itself.
         heading: cost of a wrong direction of the push [1/rad²].
         offset: cost of the box's offset, per square of the fraction of half the bumper.
-        rim: cost of an offset beyond ``safe``, the same.
-        safe: fraction of half the bumper within which an offset costs no more than ``offset``.
+        rim: cost of an offset beyond 0.6 of half the bumper, the same.
         angle: cost of a box that does not lie on the bumper [1/rad²].
         grip: cost of a curvature beyond ``margin`` times the stable one.
         margin: fraction of the stable curvature that is used; light boxes in MuJoCo need 0.6
@@ -88,7 +86,6 @@ class PushingConfig(CheckedFields):
     heading: NonNegativeFloat = 0.2
     offset: NonNegativeFloat = 0.02
     rim: NonNegativeFloat = 4.0
-    safe: Fraction = 0.6
     angle: NonNegativeFloat = 0.1
     grip: NonNegativeFloat = 0.03
     margin: PositiveFraction = 0.7

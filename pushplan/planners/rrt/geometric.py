@@ -20,6 +20,9 @@ from pushplan.world.checks import FloatArray, expect
 from pushplan.world.planning_call import PlanningCall
 
 _GOAL_BIAS = 0.1  # fraction of samples that are drawn from the goal
+_STEP = 1.0  # longest edge of the tree [R]
+_RESOLUTION = 0.1  # distance between collision checks along an edge [R]
+_SPACING = 0.15  # distance between the poses of the plan [R]
 
 
 @dataclass(frozen=True)
@@ -29,17 +32,11 @@ class GeometricRRTConfig(CheckedFields):
     Args:
         clearance: distance kept between the robot's centre and obstacles [R], as far as there is
             room; the reference grows its robot by about as much.
-        step: longest edge of the tree [R].
-        resolution: distance between collision checks along an edge [R].
         pass_iterations: samples in each pass.
-        spacing: distance between the poses of the plan [R].
     """
 
     clearance: PositiveFloat = 1.9
-    step: PositiveFloat = 1.0
-    resolution: PositiveFloat = 0.1
     pass_iterations: PositiveInt = 20_000
-    spacing: PositiveFloat = 0.15
 
 
 @dataclass(frozen=True)
@@ -88,7 +85,7 @@ class GeometricRRT:
             points, used = self._grow(call, among, radius, iterations)
             iterations += used
             if points is not None:
-                plan = polyline_plan(world, points, config.spacing * size)
+                plan = polyline_plan(world, points, _SPACING * size)
                 status = polyline_status(world, plan)
                 return call.result(status, plan, call.elapsed, iterations)
             if call.check(iterations, np.inf):
@@ -127,7 +124,7 @@ class GeometricRRT:
 
             info.setStateValidityChecker(valid)
             size = world.robot.circumscribed_radius
-            step = config.resolution * size / space.getMaximumExtent()
+            step = _RESOLUTION * size / space.getMaximumExtent()
             info.setStateValidityCheckingResolution(min(step, 0.5))
             info.setup()
             problem = base.ProblemDefinition(info)
@@ -138,7 +135,7 @@ class GeometricRRT:
             region = _GoalRegion(info, world.navigation_goal, among.bounds, rng)
             problem.setGoal(region)
             planner = geometric.RRT(info)
-            planner.setRange(config.step * size)
+            planner.setRange(_STEP * size)
             planner.setGoalBias(_GOAL_BIAS)
             planner.setProblemDefinition(problem)
             planner.setup()

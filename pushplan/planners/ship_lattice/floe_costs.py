@@ -9,7 +9,9 @@ from pushplan.planners.ship_lattice.ship_lattice_config import ShipLatticeConfig
 from pushplan.world import World
 from pushplan.world.outline import areas_and_centroids
 
-_SOFT = 0.05
+_SOFT = 0.05  # keeps the cost of a cell finite at the edge of a floe where the exponent is negative
+_DISPLACEMENT = 2.7
+"""Distance by which a floe that the hull runs over is pushed, in half beams plus floe radii."""
 
 
 def floe_costs(
@@ -34,6 +36,6 @@ def floe_costs(
         middle = config.collision_weight * energy / (0.5 * ship) * cell / half
         soft = float(np.mean((1.0 + 0.5 / np.maximum(cells, 0.1)) ** 2 - 1.0))
         return FloeCosts(middle * mean * areas / cell**2, areas, config.exponent, soft)
-    pushed = config.displacement * (half + radii)
+    pushed = _DISPLACEMENT * (half + radii)
     weight = config.push_weight / robot.mass
     return FloeCosts(weight * floes.masses * pushed, areas, config.exponent, _SOFT)

@@ -20,6 +20,7 @@ from pushplan.motion.room_ahead import Room, gets_away
 from pushplan.motion.speed_profile import check_turns, goal_is_outside, timed_plan, turning_radius
 from pushplan.motion.state_lattice.built_lattice import BuiltLattice
 from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
+from pushplan.motion.state_lattice.lattice_config import SPACING
 from pushplan.motion.state_lattice.lattice_path import bare_path, lay_path
 from pushplan.motion.state_lattice.lattice_search import open_search, path_arcs
 from pushplan.motion.time_slicing import Pace, Stopped
@@ -35,6 +36,7 @@ from pushplan.world.planning_call import PlanningCall
 
 _SPREAD = 0.6  # typical sideways displacement of a shortcut [R]
 _MOST_TURN = 2.5  # greatest turn of one of its curves [rad]
+_BATCH = 100  # nodes expanded between two looks at the stop rule
 _END_FRACTION = 0.15  # fraction of the shortcuts that move the end
 
 
@@ -133,7 +135,7 @@ class ShipLatticeCall:
         star, curves = open_search(built, builder)
         result = PAUSED
         while not self.stopped():
-            for first, last in self._pace.pieces(self.config.batch, self.stopped):
+            for first, last in self._pace.pieces(_BATCH, self.stopped):
                 result = star.run(last - first)
                 if result != PAUSED:
                     break
@@ -189,7 +191,7 @@ class ShipLatticeCall:
         self.near = NearbyObjects.around(world, normal, ahead)
         problem = ShortcutProblem(
             radius=builder.radius,
-            spacing=config.spacing * self.size,
+            spacing=SPACING * self.size,
             spread=_SPREAD * self.size,
             most_turn=_MOST_TURN,
             end_fraction=_END_FRACTION,

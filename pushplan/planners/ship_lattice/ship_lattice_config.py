@@ -12,7 +12,6 @@ from pushplan.world.checked_fields import (
     NonNegativeFloat,
     NonNegativeInt,
     OneOf,
-    PositiveInt,
 )
 
 FLOE_COSTS = ("displacement", "kinetic-energy")
@@ -27,11 +26,8 @@ class ShipLatticeConfig(LatticeConfig):
         floe_cost: by how far a floe would be pushed ("displacement"), or by the kinetic energy
             that the collision takes ("kinetic-energy", as published).
         collision_weight: α, factor on the kinetic-energy cost.
-        displacement: how far a floe is pushed that the hull runs over, in sums of half the beam
-            and its radius.
         exponent: how the cost of a floe is spread over it, see `FloeCosts`.
         side: distance of the robot's origin from the bounds [B]; less where it starts nearer.
-        batch: nodes expanded between two looks at the stop rule.
         searches: of the lattice, one after the other, as factors on ``push_weight``. The first path
             is there after the first one; the sweeps choose among all.
         shortcuts: random changes of the path of the lattice that are tried, each with a sweep.
@@ -42,10 +38,8 @@ class ShipLatticeConfig(LatticeConfig):
     push_weight: NonNegativeFloat = 1.5
     floe_cost: Annotated[str, OneOf(FLOE_COSTS)] = "displacement"
     collision_weight: NonNegativeFloat = 1.0
-    displacement: NonNegativeFloat = 2.7
     exponent: Annotated[float, Limits(-0.9, 4.0)] = -0.5
     side: NonNegativeFloat = 0.75
-    batch: PositiveInt = 100
     searches: Annotated[tuple[float, ...], Each(Limits(0.0))] = (1.0, 0.0, 0.5, 2.0, 4.0)
     shortcuts: NonNegativeInt = 60
     sweep_horizon: NonNegativeFloat = 10.0

@@ -19,6 +19,8 @@ from pushplan.world.polyline import step_lengths
 
 SPACING = 0.05
 """Between the poses of a path, in hull lengths."""
+_TRIES = 2.5
+"""Pieces predicted exactly for each path kept; the others are left out by their estimate."""
 
 
 @dataclass(eq=False)
@@ -84,7 +86,7 @@ class BeamSearch(Generic[Ice]):
                     continue
                 found.append((self._cost(node.length, node.work, arc, None), node, arc))
         found.sort(key=lambda item: item[0])
-        return found[: math.ceil(self.config.tries * width)]
+        return found[: math.ceil(_TRIES * width)]
 
     def _arc(self, pose: FloatArray, curvature: float) -> FloatArray:
         """(N, 4) an arc, cut off at the goal; empty where it leaves the channel."""

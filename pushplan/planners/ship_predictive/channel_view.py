@@ -24,6 +24,8 @@ from pushplan.world.checks import FloatArray, IntArray
 from pushplan.world.outline import areas_and_centroids
 
 _MOST_PLACES = 20_000  # rows times columns of the table of costs to go, about
+_ROW = 0.12  # distance between its rows [hull lengths]
+_COLUMN = 0.1  # distance between its columns [hull lengths]
 
 
 @dataclass(frozen=True)
@@ -162,12 +164,12 @@ def _costs_to_go(
     width = float(channel.high[0] - channel.low[0])
     ahead = away + length
     # a table over wide water is coarser, so that it is there in milliseconds
-    places = (width / (config.column * length)) * (ahead / (config.row * length))
+    places = (width / (_COLUMN * length)) * (ahead / (_ROW * length))
     coarser = length * max(1.0, math.sqrt(places / _MOST_PLACES))
-    columns = max(2, math.ceil(width / (config.column * coarser)) + 1)
-    column = max(width / (columns - 1), 0.1 * config.column * length)
+    columns = max(2, math.ceil(width / (_COLUMN * coarser)) + 1)
+    column = max(width / (columns - 1), 0.1 * _COLUMN * length)
     cell = 0.5 * column
-    rows = max(2, math.ceil(ahead / (config.row * coarser)) + 1)
+    rows = max(2, math.ceil(ahead / (_ROW * coarser)) + 1)
     costs = IceCostToGo(
         table=np.empty((rows, columns, HEADINGS)),
         field=np.empty((math.ceil((away + 3.0 * length) / cell) + 1, 2 * columns - 1)),
@@ -184,8 +186,6 @@ def _costs_to_go(
     )
     radii = np.sqrt(areas_and_centroids(bodies.vertices, bodies.offsets)[0] / np.pi)
     half_beam = 0.5 * float(np.ptp(vertices[:, 1]))
-    gain = float(config.gain)
-    crowding = float(config.crowding)
-    fill_field(Floes(floes, radii, bodies.masses, half_beam, gain, crowding), costs)
+    fill_field(Floes(floes, radii, bodies.masses, half_beam), costs)
     fill_table(costs)
     return costs

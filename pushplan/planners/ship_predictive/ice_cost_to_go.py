@@ -4,7 +4,8 @@ The table holds, for the ship's place and heading, the least of travel plus weig
 by dynamic programming from the goal line backwards. The work of a metre is taken from the floes as
 they lie: each counts with its mass times 1 - d² / R², d being the distance of the bow from its
 centre and R their two half widths (after the collision cost of AUTO-IceNav, arXiv 2411.17155), and
-more than in proportion where floes crowd. All of it happens in a frame whose y axis points ahead.
+more than in proportion where floes crowd: twice as much where as much mass as that of the typical
+floe lies ahead. All of it happens in a frame whose y axis points ahead.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from pushplan.world.checks import FloatArray
 STEEPEST = math.radians(80.0)
 """Greatest angle between the ship and the direction ahead in the table."""
 HEADINGS = 17
+_GAIN = 1.5  # work of a metre per mass ahead of the bow
 _OUTSIDE = 300.0
 """Cost of each metre beside the channel against a metre of travel: finite, so that costs can be
 interpolated, and the search looks for the way back where it has to start there."""
@@ -49,8 +51,6 @@ class Floes(NamedTuple):
     radii: FloatArray  # (K,) of discs with their areas [m]
     masses: FloatArray  # (K,) [kg]
     half_beam: float  # Of the ship [m]
-    gain: float  # Work per mass ahead of the bow
-    crowding: float  # Increase of it for each typical floe there
 
 
 @kernel(allocates=True)
@@ -74,7 +74,7 @@ def fill_field(floes: Floes, out: IceCostToGo) -> None:
         typical = np.median(masses)
         for r in range(rows):
             for c in range(columns):
-                field[r, c] *= floes.gain * (1.0 + floes.crowding * field[r, c] / typical)
+                field[r, c] *= _GAIN * (1.0 + field[r, c] / typical)
 
 
 @kernel

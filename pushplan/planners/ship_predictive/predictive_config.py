@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
 
 from pushplan.world.checked_fields import (
     CheckedFields,
-    Limits,
     NonNegativeFloat,
     NonNegativeInt,
     PositiveFloat,
@@ -31,15 +29,9 @@ class PredictiveConfig(CheckedFields):
             predictions are cheap then.
         widest: with a stop rule the search begins with a quarter of the width, and is repeated
             with twice as much up to this.
-        tries: pieces that are predicted exactly for each path kept; the others are left out by
-            their estimate.
         horizon: length of path for which the ice is predicted; from there on the costs to go count.
         farthest: goal lines that are farther away are approached, with a line at this distance.
         margin: least distance of the ship's origin from the sides of the channel, in half beams.
-        row: distance between the rows of the table of costs to go.
-        column: distance between its columns.
-        gain: work of a metre per mass ahead of the bow, in that table.
-        crowding: how much more that is for each typical floe there.
     """
 
     push_weight: NonNegativeFloat = 1.5
@@ -49,14 +41,9 @@ class PredictiveConfig(CheckedFields):
     width: PositiveInt = 12
     sparse: NonNegativeInt = 150
     widest: int = 48
-    tries: Annotated[float, Limits(1.0)] = 2.5
     horizon: PositiveFloat = 5.0
     farthest: PositiveFloat = 40.0
     margin: NonNegativeFloat = 1.0
-    row: PositiveFloat = 0.12
-    column: PositiveFloat = 0.1
-    gain: NonNegativeFloat = 1.5
-    crowding: NonNegativeFloat = 1.0
 
     def __post_init__(self) -> None:
         super().__post_init__()

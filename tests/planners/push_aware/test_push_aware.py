@@ -462,10 +462,9 @@ def test_goals_for_objects_are_refused():
     "options",
     [
         {"push_weight": -1},
-        {"curvatures": 2},
-        {"nodes": 1},
+        {"differential_radius": 0},
         {"heuristic_inflation": np.nan},
-        {"memory": 0},
+        {"random_fraction": -1},
     ],
 )
 def test_bad_parameters(options):

@@ -256,7 +256,7 @@ def test_unknown_names_list_the_choices():
 
 @pytest.mark.parametrize(
     "options",
-    [{"push_weight": -1}, {"turn_fraction": 0}, {"margin": 2}, {"batch": 0}, {"edge": np.nan}],
+    [{"push_weight": -1}, {"turn_fraction": 0}, {"margin": 2}, {"default_iterations": 0}],
 )
 def test_bad_parameters(options):
     with pytest.raises(InvalidInputError):

@@ -302,7 +302,7 @@ def test_a_lattice_needs_no_lattice_type() -> None:
     [
         {"floe_cost": "gold"},
         {"headings": 9},
-        {"step": 0.0},
+        {"horizon": 0.0},
         {"searches": (-1.0,)},
         {"searches": ()},
         {"heuristic": "none"},
