@@ -21,7 +21,7 @@ from pushplan.compiled import kernel
 from pushplan.geometry.obstacle_grid import ObstacleGrid, sees
 from pushplan.geometry.obstacles import core_distance
 from pushplan.geometry.regions import nearest_in_region
-from pushplan.geometry.visibility import GoalScene, is_tangent
+from pushplan.geometry.visibility import GoalScene, goal_leg, is_tangent
 from pushplan.search.heap import pop_least, push_or_lift
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
@@ -103,32 +103,6 @@ def bounds_by_obstacle(corners: Corners, scene: GoalScene) -> FloatArray:
 
 
 @kernel
-def exit_leg(x: float, y: float, search: VisibilitySearch) -> tuple[float, float, float]:
-    """The straight way to the nearest region that can be seen: length [m] (inf) and its end."""
-    scene = search.scene
-    regions = scene.regions
-    box = scene.box
-    gap = scene.gap
-    best = math.inf
-    bx = x
-    by = y
-    count = regions.discs.shape[0] + regions.lines.shape[0] + regions.offsets.shape[0] - 1
-    for k in range(count):
-        qx, qy = nearest_in_region(k, x, y, regions)
-        length = math.hypot(qx - x, qy - y)
-        if (
-            length < best
-            and box[0] - gap <= qx <= box[2] + gap
-            and box[1] - gap <= qy <= box[3] + gap
-            and sees(x, y, qx, qy, scene.obstacles, gap, search.grid, search.seen)
-        ):
-            best = length
-            bx = qx
-            by = qy
-    return best, bx, by
-
-
-@kernel
 def _offer(
     search: VisibilitySearch,
     frontier: Frontier,
@@ -182,7 +156,7 @@ def expand(
     rest = False
     if low == -math.inf:
         high = straight + search.grid.cell
-        leg, _, _ = exit_leg(x, y, search)
+        leg, _, _ = goal_leg(x, y, scene)
         if leg < math.inf:
             _offer(search, frontier, point.shape[0], length + leg, 0.0, at)
         for j in range(count, point.shape[0]):
@@ -303,7 +277,7 @@ def path_found(search: VisibilitySearch) -> tuple[float, list[FloatArray]]:
     path = []
     if at < len(search.corners.owner):  # it goes on into the goal
         x, y = (search.start if at == START else points[at]).tolist()
-        total, qx, qy = exit_leg(x, y, search)
+        total, qx, qy = goal_leg(x, y, search.scene)
         if total > 0.0:
             path.append(np.array([qx, qy]))
     while at != START:
