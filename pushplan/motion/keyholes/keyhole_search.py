@@ -15,19 +15,20 @@ from pushplan.interaction import InteractionModel
 from pushplan.motion.collision import first_blocked, footprint, obstacles, static_depth
 from pushplan.motion.keyholes.disc_space import DiscSpace, DiscState
 from pushplan.motion.keyholes.keyhole_config import KeyholeConfig
+from pushplan.motion.keyholes.line_pushes import (
+    CONTACT,
+    SPACING,
+    line_pushes,
+    push_path,
+    straight_poses,
+)
 from pushplan.motion.time_slicing import go_on, never
 from pushplan.world import Drive, World
 from pushplan.world.checks import FloatArray
-from pushplan.world.outline import transform
 from pushplan.world.polyline import path_length, path_lengths
 
 _MOST_OBJECTS = 40  # among more, no keyholes are looked for
 _MOST_CELLS = 400_000  # of the configuration space
-_NARROW = 0.3  # faces narrower than this are not pushed [circumscribed radii]
-_SPACING = 0.1
-"""Distance between the poses of a push [circumscribed radii]."""
-_CONTACT = 5
-"""Index of the pose of a push in which the robot touches the face."""
 _LEAVING = 2.5  # length of a straight drive to where its disc is free [circumscribed radii]
 
 
@@ -54,44 +55,6 @@ class KeyholeEnd:
         if self.before is None:
             return [self]
         return [*self.before.chain(), self]
-
-
-def _straight(pose: FloatArray, along: FloatArray) -> FloatArray:
-    """(N, 3) poses ahead of one (3,), by some distances (N,) [m], negative for behind."""
-    heading = np.array([np.cos(pose[2]), np.sin(pose[2])])
-    places = pose[:2] + along[:, None] * heading
-    return np.column_stack([places, np.full(len(along), pose[2])])
-
-
-def _line_pushes(
-    world: World, k: int, pose: FloatArray, clearance: float, offsets: tuple[float, ...]
-) -> Iterator[tuple[FloatArray, float]]:
-    """The pushes of object ``k`` at a pose (3,): at each face, in its middle and beside it.
-
-    Args:
-        world: whose robot and objects they are.
-        k: index of the object.
-        pose: of the object.
-        clearance: of the robot's middle from the face at the start [m].
-        offsets: how far beside the middle, as fractions of half the face.
-
-    Returns:
-        Pose (3,) of the robot at the start, whose disc touches the face, and distance from there to
-        the contact [m].
-    """
-    size = world.robot.circumscribed_radius
-    front = float(world.robot.vertices[:, 0].max())
-    corners = transform(pose, world.movables.outline(k))
-    for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-        edge = b - a
-        length = float(np.hypot(*edge))
-        if length < _NARROW * size:
-            continue
-        out = np.array([edge[1], -edge[0]]) / length
-        heading = float(np.arctan2(-out[1], -out[0]))
-        for beside in offsets:
-            place = 0.5 * (a + b) + 0.5 * beside * edge + clearance * out
-            yield np.array([*place, heading]), clearance - front
 
 
 def suits_keyholes(world: World, config: KeyholeConfig) -> bool:
@@ -164,6 +127,7 @@ class KeyholeSearch:
         count = self._count = [0]  # apart, so that the space does not hold the search
         size = world.robot.circumscribed_radius
         self._size = size
+        self._longest = config.longest * size
         self._space = _disc_space(world, config, lambda: stopped(count[0]))
         self._shape = footprint(world.robot, config.margin * size)
         self._bare = footprint(world.robot)
@@ -208,8 +172,8 @@ class KeyholeSearch:
         steps = np.arange(0.0, _LEAVING, self.config.cell)
         for length in sorted([*steps, *-steps[1:]], key=abs):
             go_on(self._space.stopped)
-            along = np.linspace(0.0, length * self._size, 2 + int(abs(length) / _SPACING))
-            path = _straight(robot, along)
+            along = np.linspace(0.0, length * self._size, 2 + int(abs(length) / SPACING))
+            path = straight_poses(robot, along)
             if not state.is_free(path[-1]) or self._hits_wall(path):
                 continue
             if length < 0.0 or self.interaction.sweep(self.world, path).work == 0.0:
@@ -249,10 +213,11 @@ class KeyholeSearch:
         for k in dict.fromkeys(chosen):
             pose = end.state.poses[k]
             clearance = self._space.radius + self._space.cell
-            starts = _line_pushes(self.world, k, pose, clearance, self.config.offsets)
+            starts = line_pushes(self.world, k, pose, clearance, self.config.offsets)
             for start, lead in starts:
                 if end.state.gets_to(start):
-                    yield from self._push(end, k, self._path(start, lead), rank)
+                    path = push_path(start, lead, self._longest, self._size)
+                    yield from self._push(end, k, path, rank)
                     go_on(self._space.stopped)
 
     def _is_near(self, end: KeyholeEnd, k: int, on_path: list[int]) -> bool:
@@ -263,13 +228,6 @@ class KeyholeSearch:
         there = end.state.poses[on_path[0], :2]
         reach = self.world.movables.radii[k] + self.world.movables.radii[on_path[0]]
         return math.dist(here, there) < float(reach) + 2.0 * self._size
-
-    def _path(self, start: FloatArray, lead: float) -> FloatArray:
-        """(N, 3) poses of a push to the contact, which has index `_CONTACT`, and on."""
-        spacing = _SPACING * self._size
-        longest = self.config.longest * self._size
-        on = lead + np.arange(1, round(longest / spacing) + 1) * _SPACING * self._size
-        return _straight(start, np.concatenate([np.linspace(0.0, lead, _CONTACT + 1), on]))
 
     def _push(self, end: KeyholeEnd, k: int, path: FloatArray, rank: int) -> Iterator[KeyholeEnd]:
         """The scenes after a push of object ``k``, ended where it opens one, or in a later rank."""
@@ -282,8 +240,8 @@ class KeyholeSearch:
         scene = self.world.moved(robot_pose=path[0], movable_poses=end.state.poses)
         swept = self.interaction.sweep(scene, path[: max(free, 1)])
         last = free - 1 if swept.jammed_at < 0 else swept.jammed_at - 1
-        step = max(1, round(config.step / _SPACING))
-        ends = list(range(_CONTACT + step, last + 1, step))
+        step = max(1, round(config.step / SPACING))
+        ends = list(range(CONTACT + step, last + 1, step))
         left = 2  # the first place that is open, and one beyond
         for n in ends:
             go_on(self._space.stopped)
@@ -310,7 +268,7 @@ class KeyholeSearch:
         driven = path_length(path)
         state = DiscState(self._space, moved)
         for back in np.arange(cell, driven, cell):
-            away = _straight(path[-1], -np.linspace(0.0, back, int(back / cell) + 2)[1:])
+            away = straight_poses(path[-1], -np.linspace(0.0, back, int(back / cell) + 2)[1:])
             if not state.is_free(away[-1]):
                 continue
             state.robot = away[-1]
