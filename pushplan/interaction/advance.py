@@ -38,6 +38,6 @@ def advance_objects(
         moved: (K,) path lengths of the objects [m], added to in place.
 
     Returns:
-        Whether the robot gets there; False where it jams.
+        True where the robot gets there, False where it jams.
     """
     raise NotImplementedError

@@ -12,12 +12,11 @@ from scipy.optimize import minimize
 from test_tracking_controllers import FLOOR, arc_plan
 
 from pushplan.control import MpcConfig, MpcTracker
+from pushplan.control.mpc.assembly_kernels import assemble, assembly_memory
 from pushplan.control.mpc.quadratic_program import ProgramSolver, quadratic_program
 from pushplan.control.mpc.tracking_kernels import (
     ReferencePath,
     Tuning,
-    assemble,
-    assembly_memory,
     errors,
     locate,
 )

@@ -9,6 +9,7 @@ import numpy as np
 
 from pushplan.compiled import owned
 from pushplan.control.limits import driven_twist
+from pushplan.control.mpc.assembly_kernels import assembly_memory
 from pushplan.control.mpc.horizon import FAILED, make_horizon, solve_rounds, track_of
 from pushplan.control.mpc.mpc_config import MpcConfig
 from pushplan.control.mpc.quadratic_program import ProgramSolver
@@ -19,7 +20,7 @@ from pushplan.control.mpc.tracker_kernels import (
     begin_track,
     finish_step,
 )
-from pushplan.control.mpc.tracking_kernels import Tuning, assembly_memory
+from pushplan.control.mpc.tracking_kernels import Tuning
 from pushplan.control.staged_controller import StagedController
 from pushplan.world import Drive, Plan, RobotModel, Twist, World
 from pushplan.world.checks import expect

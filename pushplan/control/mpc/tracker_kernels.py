@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pushplan.compiled import copy_into, kernel
+from pushplan.control.mpc.assembly_kernels import AssemblyMemory, assemble
 from pushplan.control.mpc.horizon import (
     FAILED,
     KNOWN,
@@ -21,11 +22,9 @@ from pushplan.control.mpc.horizon import (
     shift_steps,
 )
 from pushplan.control.mpc.tracking_kernels import (
-    AssemblyMemory,
     ReferencePath,
     Tuning,
     arc,
-    assemble,
     errors,
     locate,
 )
@@ -88,7 +87,7 @@ def begin_step(
     if abs(error) > _turn_from(memory):
         # too far from the path's heading for a linear model: turn towards it first
         horizon.counts[KNOWN] = 0
-        turn = -tuning.max_turn_rate if error > 0.0 else tuning.max_turn_rate
+        turn = np.copysign(tuning.max_turn_rate, -error)
         send(horizon, _turning_speed(horizon), turn, held, True, out)
         _remember(memory, time)
         return False
@@ -236,7 +235,7 @@ def pursue(memory: TrackerMemory, track: ReferencePath, pose: FloatArray) -> tup
     dy = y - pose[1]
     bearing = wrap_angle(np.arctan2(dy, dx) - pose[2])
     if abs(bearing) > _turn_from(memory):
-        turn = tuning.max_turn_rate if bearing > 0.0 else -tuning.max_turn_rate
+        turn = np.copysign(tuning.max_turn_rate, bearing)
         return _turning_speed(memory.horizon) if tuning.stops else speed, turn
     curvature = 2.0 * np.sin(bearing) / max(np.sqrt(dx * dx + dy * dy), 1e-9)
     radius = memory.horizon.limits.turning_radius
