@@ -66,7 +66,7 @@ def polyline_status(world: World, plan: Plan) -> PlanStatus:
     fast |= turns * robot.min_turning_radius > lengths + 1e-9
     fast |= (turns > 1e-9) & math.isfinite(robot.max_turn_acceleration)  # all at once, at a corner
     near = 1e-9 * robot.circumscribed_radius
-    if np.abs(off[:2]).max() > near or abs(wrap_angle(off[2])) > 1e-9 or fast.any():
+    if np.abs(off[:2]).max() > near or abs(math.remainder(off[2], math.tau)) > 1e-9 or fast.any():
         return PlanStatus.PATH_ONLY
     step = _FINE * robot.circumscribed_radius
     counts = np.maximum(np.ceil(lengths / step), 1.0).astype(np.int64)

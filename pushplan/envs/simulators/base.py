@@ -212,7 +212,7 @@ def straight_leg(
     """From a pose (3,) to another at full speed: dx, dy [m], turn [rad], time [s]."""
     dx = float(b[0] - a[0])
     dy = float(b[1] - a[1])
-    turn = math.remainder(float(b[2] - a[2]), 2.0 * math.pi)
+    turn = math.remainder(float(b[2] - a[2]), math.tau)
     return dx, dy, turn, max(math.hypot(dx, dy) / robot.max_speed, abs(turn) / robot.max_turn_rate)
 
 

@@ -75,7 +75,7 @@ def _drive_leg(
         # where the reference is in the robot's frame
         ahead = c * ex + s * ey
         left = c * ey - s * ex
-        turned = math.remainder(reference[2] - theta, 2.0 * math.pi)
+        turned = math.remainder(reference[2] - theta, math.tau)
         late = math.hypot(ahead, left) > _LATE * robot.circumscribed_radius
         late |= abs(turned) > _LATE
         part = period if late else min(period, duration - done)

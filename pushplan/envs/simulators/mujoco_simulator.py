@@ -202,7 +202,7 @@ def _rates(poses: FloatArray) -> tuple[float, float]:
     first = poses[0]
     last = poses[-1]
     count = max(len(poses) - 1, 1)
-    turn = math.remainder(float(last[2] - first[2]), 2.0 * math.pi)
+    turn = math.remainder(float(last[2] - first[2]), math.tau)
     middle = float(first[2]) + 0.5 * turn
     way = (last[0] - first[0]) * math.cos(middle) + (last[1] - first[1]) * math.sin(middle)
     return float(way) / count, turn / count

@@ -92,7 +92,7 @@ class PushCost(Protocol):
 
 def signature(push: Push) -> tuple[object, ...]:
     """Return the key by which a failed push is recognised."""
-    heading = math.remainder(float(push.start[2]), 2.0 * math.pi)
+    heading = math.remainder(float(push.start[2]), math.tau)
     if push.controller == "arc":
         return push.target, push.controller, round(heading / 0.6)
     return push.target, push.controller, round(heading / 0.3), round(push.shift, 2), push.gain

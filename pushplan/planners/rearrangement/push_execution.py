@@ -293,7 +293,7 @@ class PushExecution:
 def _along_line(scene: PushScene, start: FloatArray) -> Twist:
     """The velocity that keeps the robot on the line of a push that began at a pose (3,)."""
     pose = scene.world.robot_pose
-    error = math.remainder(float(start[2] - pose[2]), 2.0 * math.pi)
+    error = math.remainder(float(start[2] - pose[2]), math.tau)
     away = pose[:2] - start[:2]
     left = float(math.cos(start[2]) * away[1] - math.sin(start[2]) * away[0])
     turn = 0.5 * error - 0.3 * left / scene.size

@@ -189,7 +189,7 @@ def initial_heading(path: FloatArray, ahead: float) -> float:
 
 def pose_distance(pose: FloatArray, other: FloatArray, size: float) -> float:
     """Return the distance between two poses (3,) of an object, turns included, in ``size``."""
-    turn = math.remainder(float(pose[2] - other[2]), 2.0 * math.pi)
+    turn = math.remainder(float(pose[2] - other[2]), math.tau)
     return math.dist(pose[:2], other[:2]) / size + 0.2 * abs(turn)
 
 

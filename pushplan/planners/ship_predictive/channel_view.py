@@ -96,7 +96,7 @@ def channel_view(world: World, config: PredictiveConfig, model: IceInteraction) 
     reach = world.movables.radii + length
     goal = min(away, config.farthest * length)
     near = np.flatnonzero((floes[:, 1] > -reach) & (floes[:, 1] < goal + reach))
-    off = math.remainder(float(world.robot_pose[2]) - turn - 0.5 * math.pi, 2.0 * math.pi)
+    off = math.remainder(float(world.robot_pose[2]) - turn - 0.5 * math.pi, math.tau)
     radius = robot.turning_radius / config.turn_fraction
     margin = config.margin * 0.5 * float(np.ptp(robot.vertices[:, 1])) + world.margin
     low, high = _box(world, turn, margin, (1.0 + 1e-6) * radius * (1.0 - math.cos(off)), off)
