@@ -39,7 +39,7 @@ from pushplan.planners.pushing import (
     spread_of,
     warm_up,
 )
-from pushplan.planners.rearrangement.push_execution import GeometricPusher
+from pushplan.planners.rearrangement.push_controllers import GeometricPusher
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.world import (

@@ -9,7 +9,8 @@ import numpy as np
 from pushplan.compiled import copy_into, kernel, owned
 from pushplan.geometry.convex import convex_distance, convex_penetration
 from pushplan.geometry.obstacles import Obstacles
-from pushplan.planners.pushing.contact_kernels import Contact, advance, box_pose
+from pushplan.planners.pushing.box_motion_kernels import advance, box_pose
+from pushplan.planners.pushing.contact_kernels import Contact
 from pushplan.world import RobotModel
 from pushplan.world.checks import FloatArray, IntArray
 from pushplan.world.outline import flatten

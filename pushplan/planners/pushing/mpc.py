@@ -28,10 +28,6 @@ from pushplan.planners.pushing.cost_kernels import Weights, assembly_memory
 from pushplan.planners.pushing.parameters import PushingConfig
 from pushplan.planners.pushing.path import PushPath
 from pushplan.planners.pushing.push_kernels import (
-    ALONG,
-    SLOWED,
-    Faces,
-    PushingMemory,
     assemble_push,
     begin_push,
     drive_push,
@@ -39,6 +35,7 @@ from pushplan.planners.pushing.push_kernels import (
     send_push,
 )
 from pushplan.planners.pushing.push_model import PushModel, PushState
+from pushplan.planners.pushing.push_observer_kernels import ALONG, SLOWED, Faces, PushingMemory
 from pushplan.planners.warm_up_worlds import warm_up_worlds
 from pushplan.world import Drive, InvalidInputError, Plan, RobotModel, Twist, World
 from pushplan.world.checks import FloatArray, IntArray, expect
@@ -88,12 +85,16 @@ class PushingMpc:
     @property
     def fallbacks(self) -> int:
         """Calls since the start of the episode in which the solver gave no solution."""
-        return 0 if self._memory is None else int(self._memory.horizon.counts[FAILED])
+        if self._memory is None:
+            return 0
+        return int(self._memory.horizon.counts[FAILED])
 
     @property
     def model(self) -> PushModel | None:
         """Of the box that is pushed."""
-        return None if self._memory is None else self._models[int(self._memory.face[0])]
+        if self._memory is None:
+            return None
+        return self._models[int(self._memory.face[0])]
 
     @property
     def state(self) -> PushState | None:
@@ -186,7 +187,9 @@ class PushingMpc:
         )
 
     def _told(self, place: int) -> float:
-        return math.nan if self._memory is None else float(self._memory.told[place])
+        if self._memory is None:
+            return math.nan
+        return float(self._memory.told[place])
 
 
 def groups_of(horizon: int, moves: int) -> IntArray:

@@ -12,13 +12,8 @@ import numpy as np
 
 from pushplan.compiled import copy_into, kernel
 from pushplan.control.mpc.tracking_kernels import arc, errors, locate
-from pushplan.planners.pushing.contact_kernels import (
-    Contact,
-    advance,
-    advance_box,
-    flush_angle,
-    standoff,
-)
+from pushplan.planners.pushing.box_motion_kernels import advance, advance_box
+from pushplan.planners.pushing.contact_kernels import Contact, flush_angle, standoff
 from pushplan.planners.pushing.cost_kernels import (
     ROWS,
     Memory,

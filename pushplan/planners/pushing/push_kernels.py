@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from pushplan.compiled import copy_into, kernel
@@ -11,8 +9,6 @@ from pushplan.control.mpc.horizon import (
     FAILED,
     KNOWN,
     MISSED,
-    UNDER_WAY,
-    Horizon,
     keep_solution,
     lay_steps,
     remember,
@@ -21,13 +17,23 @@ from pushplan.control.mpc.horizon import (
     shift_steps,
 )
 from pushplan.control.mpc.tracking_kernels import ReferencePath, locate
-from pushplan.geometry.angles import wrap_angle
 from pushplan.geometry.obstacles import Obstacles
-from pushplan.planners.pushing.clearance_kernels import ClearanceProblem, free_fraction
-from pushplan.planners.pushing.contact_kernels import Contact, advance, box_pose, observe
-from pushplan.planners.pushing.cost_kernels import Memory, PushingProblem, Weights
+from pushplan.planners.pushing.box_motion_kernels import box_pose
+from pushplan.planners.pushing.clearance_kernels import free_fraction
+from pushplan.planners.pushing.cost_kernels import PushingProblem, Weights
 from pushplan.planners.pushing.problem_kernels import assemble
-from pushplan.world.checks import FloatArray, IntArray
+from pushplan.planners.pushing.push_observer_kernels import (
+    ALONG,
+    LATERAL,
+    SEEN_AT,
+    SLOWED,
+    VALUE,
+    PushingMemory,
+    contact_now,
+    estimate,
+    take_face,
+)
+from pushplan.world.checks import FloatArray
 
 _BACK = 0.5
 _WINDOW = 2.0
@@ -43,48 +49,6 @@ _AHEAD = 2.0
 _BLOCKED = 0.5
 _ASIDES = 6
 """Fraction of a command below which others are tried, and how many."""
-_TURNED = np.pi * 50.0 / 180.0  # angle at which another face is taken to be the pushed one
-_JUMP = 0.35  # a pose farther than this from the predicted one replaces it [L]
-ALONG, LATERAL, SLOWED, VALUE, SEEN_AT, OBSERVED = range(6)
-"""Places in `PushingMemory.told`."""
-
-
-class Faces(NamedTuple):
-    """The sides of a box, F of them, on one bumper."""
-
-    scores: FloatArray  # (F, 3) see `faces_of`
-    contacts: FloatArray  # (F, 8) as `Contact`
-    normals: FloatArray  # (F,) direction of the inward normal in the box's frame [rad]
-    curvatures: FloatArray  # (F,) as `Weights.curvature` [1/m]
-
-
-class PushingMemory(NamedTuple):
-    """All that the controller knows of one robot, box and path: parameters, state, memory."""
-
-    horizon: Horizon
-    weights: Weights  # But for length and curvature, which are of the face
-    faces: Faces
-    assembly: Memory
-    clearance: ClearanceProblem
-    groups: IntArray  # (N,) which of the M commands holds in each step
-    reach: float  # Reach of the steps at full speed [L]
-    delay: float  # Between a command and its effect [s]
-    gain: float  # Fraction by which an observation corrects what was predicted
-    face: IntArray  # (1,) the one that is pushed
-    told: FloatArray  # (6,) along and lateral [m], fraction driven, cost, time [s], 1 if observed
-    seen: FloatArray  # (6,) state as the poses show it
-    state: FloatArray  # (6,) state as estimated, see `PushState`
-    guess: FloatArray  # (6,) the one that was predicted, or is when a command of now takes effect
-    near: FloatArray  # (6,) that, with the box no farther away than the model means anything for
-    box: FloatArray  # (3,) pose of the face
-    detail: FloatArray  # (6,)
-
-
-@kernel
-def contact_now(memory: PushingMemory) -> Contact:
-    """Bumper, pushed face and friction."""
-    row = memory.faces.contacts[memory.face[0]]
-    return Contact(row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7])
 
 
 @kernel
@@ -103,18 +67,10 @@ def observe_push(
     """
     memory.told[SLOWED] = 1.0
     told = memory.told
-    faces = memory.faces
     at = memory.box
+    estimate(memory, pose, box, time)
     contact = contact_now(memory)
-    observe(contact, faces.normals[memory.face[0]], pose, box, memory.seen)
-    if abs(memory.seen[4]) > _TURNED:
-        take_face(memory, pose[2] - box[2])
-        contact = contact_now(memory)
-        observe(contact, faces.normals[memory.face[0]], pose, box, memory.seen)
     size = contact.front + contact.depth
-    _correct(memory, contact, size, time)
-    copy_into(memory.guess, memory.state)
-    _predict(memory, contact, time, time + memory.delay)
     box_pose(contact, memory.guess, at)
     low = max(told[ALONG] - _BACK * size, 0.0)
     along, index, _ = locate(track, at[0], at[1], low, told[ALONG] + _WINDOW * size)
@@ -127,65 +83,6 @@ def observe_push(
     _begin_commands(memory, held)
     memory.told[VALUE] = assemble(problem, memory.horizon.nominal, memory.assembly)
     return True
-
-
-@kernel
-def take_face(memory: PushingMemory, direction: float) -> None:
-    """Push the face that a direction [rad, box frame] meets most squarely; forget the state."""
-    scores = memory.faces.scores
-    best = -np.inf
-    c = np.cos(direction)
-    s = np.sin(direction)
-    for k in range(scores.shape[0]):
-        score = scores[k, 0] * c + scores[k, 1] * s + scores[k, 2]
-        if score > best:
-            best = score
-            memory.face[0] = k
-    memory.told[OBSERVED] = 0.0
-
-
-@kernel
-def _correct(memory: PushingMemory, contact: Contact, size: float, time: float) -> None:
-    """Correct the predicted state by a fixed fraction of what is observed, unless it jumps."""
-    told = memory.told
-    seen = memory.seen
-    state = memory.state
-    guess = memory.guess
-    if told[OBSERVED] == 1.0 and memory.gain < 1.0 and time > told[SEEN_AT]:
-        copy_into(guess, state)
-        _predict(memory, contact, told[SEEN_AT], time)
-        far = 0.0
-        turned = 0.0
-        for j in range(6):
-            change = seen[j] - guess[j]
-            if j == 2 or j == 4:
-                change = wrap_angle(change)
-                turned = max(turned, abs(change))
-            elif j > 2:
-                far = max(far, abs(change))
-            state[j] = guess[j] + memory.gain * change
-        dx = seen[0] - guess[0]
-        dy = seen[1] - guess[1]
-        far = max(far, np.sqrt(dx * dx + dy * dy))
-        if far / size >= _JUMP or turned >= _JUMP:
-            copy_into(state, seen)
-    else:
-        copy_into(state, seen)
-    state[5] = max(state[5], 0.0)
-    told[OBSERVED] = 1.0
-    told[SEEN_AT] = time
-
-
-@kernel
-def _predict(memory: PushingMemory, contact: Contact, begin: float, end: float) -> None:
-    """Move the guess on from one time to another by what takes effect in between."""
-    sent = memory.horizon.sent
-    count = memory.horizon.counts[UNDER_WAY]
-    for i in range(count):
-        until = sent[i + 1, 0] if i + 1 < count else np.inf
-        duration = min(until + memory.delay, end) - max(sent[i, 0] + memory.delay, begin)
-        if duration > 1e-12:
-            advance(contact, memory.guess, sent[i, 1], sent[i, 2], duration, memory.detail)
 
 
 @kernel

@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pushplan.planners.pushing import contact_kernels
+from pushplan.planners.pushing import box_motion_kernels, contact_kernels
 from pushplan.planners.pushing.bumper import Bumper, Face, face_towards
 from pushplan.planners.pushing.contact_kernels import Contact
 from pushplan.planners.pushing.parameters import (
@@ -121,13 +121,13 @@ class PushModel:
         robot: FloatArray = array("robot_pose", robot_pose, (3,))
         box: FloatArray = array("box_pose", box_pose, (3,))
         row = np.empty(6)
-        contact_kernels.observe(self.contact, self.face.normal, robot, box, row)
+        box_motion_kernels.observe(self.contact, self.face.normal, robot, box, row)
         return PushState.from_row(row)
 
     def box_pose(self, state: PushState) -> FloatArray:
         """(3,) pose of the box."""
         pose = np.empty(3)
-        contact_kernels.box_pose(self.contact, state.row(), pose)
+        box_motion_kernels.box_pose(self.contact, state.row(), pose)
         pose[2] -= self.face.normal
         return pose
 
@@ -146,11 +146,14 @@ class PushModel:
         """
         commands = array("twists", twists, (None, 2))
         count = len(commands)
-        steps = array("dt", dt, (count,)) if np.ndim(dt) else np.full(count, number("dt", dt))
+        if np.ndim(dt):
+            steps = array("dt", dt, (count,))
+        else:
+            steps = np.full(count, number("dt", dt))
         if (steps <= 0.0).any():
             raise InvalidInputError(f"dt must be positive, got {steps.min()}")
         row = expect("state", state, PushState).row()
         states = np.empty((count + 1, 6))
         details = np.empty((count, 6))
-        contact_kernels.rollout(self.contact, row, commands, steps, states, details)
+        box_motion_kernels.rollout(self.contact, row, commands, steps, states, details)
         return states, details

@@ -3,8 +3,8 @@
 from pushplan.planners.rearrangement.gtsp_mpc import GtspMpc
 from pushplan.planners.rearrangement.gtsp_policy import Gtsp
 from pushplan.planners.rearrangement.push import Push, PushCost
-from pushplan.planners.rearrangement.push_choice import build_push_graph
-from pushplan.planners.rearrangement.push_graph import PushGraph, push_order
+from pushplan.planners.rearrangement.push_graph import PushGraph, build_push_graph
+from pushplan.planners.rearrangement.push_order import push_order
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 

@@ -11,6 +11,7 @@ import numpy as np
 from pushplan.control import Legs
 from pushplan.control.leg_follower import turn_to
 from pushplan.interaction.kernels import sweep_path
+from pushplan.planners.rearrangement.approach_lattice import ContactGrid
 from pushplan.planners.rearrangement.pose_grid_kernels import (
     PoseGrid,
     add_layers,
@@ -22,7 +23,7 @@ from pushplan.planners.rearrangement.pose_search_kernels import (
     search_poses,
 )
 from pushplan.planners.rearrangement.push import Push
-from pushplan.planners.rearrangement.push_scene import ContactGrid, PushScene
+from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.route_kernels import RouteProblem, cheapest_legs
 from pushplan.world.checks import FloatArray, IntArray
 
@@ -158,12 +159,15 @@ def find_route(
     end = float(start[2])
     ahead = scene.size * np.array([math.cos(here[2]), math.sin(here[2])])
     near = [here[:2], *(here[:2] + fraction * ahead for fraction in _AWAY)]
-    around = target >= 0 and approach.target == target
+    expected = math.inf
     if target >= 0:
         weights = problem.weights.copy()
-        weights[target] += config.around_cost if around else config.target_cost
+        if approach.target == target:
+            weights[target] += config.around_cost
+            expected = _MORE * float(total[best]) + scene.size
+        else:
+            weights[target] += config.target_cost
         problem = problem._replace(weights=weights)
-    expected = _MORE * float(total[best]) + scene.size if around else math.inf
     cheapest: Route | None = None
     for last in ([start[:2]], []):  # it may be too near to a wall to turn there
         for points, longest in ((corners, len(corners) + 1), (every, _LONGEST), (every, 1)):

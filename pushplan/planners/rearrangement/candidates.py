@@ -10,15 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from pushplan.planners.rearrangement.goal_kernels import REMOVED
 from pushplan.planners.rearrangement.push import Push
-from pushplan.planners.rearrangement.push_scene import (
-    PushScene,
-    heading_axes,
-    initial_heading,
-    open_edges,
-)
-from pushplan.planners.rearrangement.push_simulator import PushAttempt, end_of, simulate
+from pushplan.planners.rearrangement.push_scene import PushScene
+from pushplan.planners.rearrangement.push_simulator import PushAttempt, simulate
+from pushplan.planners.rearrangement.push_starts import heading_axes, initial_heading
 from pushplan.planners.rearrangement.rearrangement_config import PushPrimitive
 from pushplan.world import ClearanceArea
 from pushplan.world.checks import FloatArray
@@ -26,11 +21,11 @@ from pushplan.world.polyline import path_length
 
 _HARD_OBJECTS = 3
 """So many objects that no simple push gets home, the nearest ones, are looked at closely."""
-_ADVANCE = 0.6
-"""By how much of the way that the robot drives an object has to get on, to be pushed at all."""
 _EARLY = 0.6
 """Distance before a failure at which a push ends that does not deliver its object [circumscribed
 radii]."""
+_OWN_CLEARANCE = 0.75
+"""Clearance of an object's path where the table gives none [radii of the object]."""
 _DETOUR = 1.3
 """Greatest distance to an edge across which an object is pushed out of an area, in distances to the
 nearest edge."""
@@ -54,7 +49,7 @@ def delivering_pushes(scene: PushScene, objects: Sequence[int]) -> list[Push]:
             continue
         few = [k for k in objects if counts[ids[k]] < row.below]
         for k in few[:_HARD_OBJECTS] if row.below == 1 and found else few:
-            for attempt in _attempts(scene, k, row):
+            for attempt in attempts(scene, k, row):
                 if scene.budget.is_used_up:
                     break
                 pushes = simulate(scene, attempt)
@@ -67,33 +62,6 @@ def delivering_pushes(scene: PushScene, objects: Sequence[int]) -> list[Push]:
     return found
 
 
-def can_be_pushed(scene: PushScene, k: int, horizon: float) -> bool:
-    """Return True if some push delivers object ``k``, or advances it where the goal is far away.
-
-    Args:
-        scene: the scene.
-        k: index of the object.
-        horizon: how far the robot drives at most to see that [m].
-    """
-    target = int(scene.movables.ids[k])
-    costs = scene.push_cost_to_go(k)
-    now = costs.at(scene.poses[k])
-
-    def gets_on(attempt: PushAttempt) -> bool:
-        if now <= horizon:
-            return any(target in push.delivers for push in simulate(scene, attempt))
-        end = end_of(scene, replace(attempt, limit=min(attempt.limit, horizon)))
-        return bool(end[0] >= 0.5 * REMOVED or costs.at(end) <= now - _ADVANCE * horizon)
-
-    return any(
-        not scene.budget.is_over
-        and all(gets_on(replace(attempt, friction=one)) for one in (None, *row.frictions))
-        for row in scene.config.primitives
-        if row.controller != "arc" and not row.deep and not row.partners
-        for attempt in _attempts(scene, k, row)
-    )
-
-
 def partial_pushes(scene: PushScene, k: int) -> Iterator[Push]:
     """Pushes of an object along its path that end before something goes wrong, and what is left.
 
@@ -104,7 +72,7 @@ def partial_pushes(scene: PushScene, k: int) -> Iterator[Push]:
     for row in scene.config.primitives:
         if row.controller != "path" or row.deep or row.partners:
             continue
-        for attempt in _attempts(scene, k, row):
+        for attempt in attempts(scene, k, row):
             if scene.budget.is_used_up:
                 return
             for whole in simulate(scene, replace(attempt, relocates=True)):
@@ -115,20 +83,32 @@ def partial_pushes(scene: PushScene, k: int) -> Iterator[Push]:
                         yield replace(push, cost=push.cost + left + 2.0 * scene.size)
 
 
-def _attempts(scene: PushScene, k: int, row: PushPrimitive) -> Iterator[PushAttempt]:
+def attempts(scene: PushScene, k: int, row: PushPrimitive) -> Iterator[PushAttempt]:
     """The pushes of one object by one row of the table."""
     if row.controller == "line":
         yield from _line_attempts(scene, k, row)
         return
-    for path, shift, wanted in _paths(scene, k, row):
+    for path, shift_of_path, wanted in _paths(scene, k, row):
         towards = initial_heading(path, 0.5 * scene.size)
         limit = 1.5 * path_length(path) + (6.0 if row.leans[0] else 4.0) * scene.size
-        shifts = [fraction * scene.half for fraction in row.shifts] if shift is None else [shift]
+        shifts = [fraction * scene.half for fraction in row.shifts]
+        if shift_of_path is not None:
+            shifts = [shift_of_path]
         for lean, aside in itertools.product(row.leans, shifts):
-            start = scene.pose_behind(k, towards + math.radians(lean), aside)
-            if scene.fits(start):
+            start = scene.starts.behind(k, towards + math.radians(lean), aside)
+            if scene.starts.fits(start):
                 for gain in row.gains:
                     yield PushAttempt(start, k, limit, path, aside, wanted, gain)
+
+
+def open_edges(area: ClearanceArea) -> Iterator[tuple[FloatArray, FloatArray, FloatArray, float]]:
+    """The edges that can be crossed: first corner, unit vectors along it and out, length [m]."""
+    ends = zip(area.polygon, np.roll(area.polygon, -1, axis=0), area.open_edges, strict=True)
+    for a, b, is_open in ends:
+        if is_open:
+            length = np.hypot(*(b - a))
+            along = (b - a) / length
+            yield a, along, np.array([along[1], -along[0]]), float(length)
 
 
 def _line_attempts(scene: PushScene, k: int, row: PushPrimitive) -> Iterator[PushAttempt]:
@@ -150,11 +130,11 @@ def _line_attempts(scene: PushScene, k: int, row: PushPrimitive) -> Iterator[Pus
                 continue
             tried: list[list[int]] = []
             for shift in row.shifts:
-                start = scene.pose_behind(k, heading, shift * scene.half)
+                start = scene.starts.behind(k, heading, shift * scene.half)
                 ahead, left = ((scene.poses[:, :2] - box) @ axis for axis in (u, v))
                 swept = (ahead > -1e-9) & (np.abs(left - shift * scene.half) < scene.half)
                 wanted = [j for j in scene.left if j == k or swept[j]]
-                if tried.count(wanted) < 2 and scene.fits(start):
+                if tried.count(wanted) < 2 and scene.starts.fits(start):
                     tried.append(wanted)
                     yield PushAttempt(start, k, scene.longest, wanted=wanted)
 
@@ -163,26 +143,29 @@ def _paths(
     scene: PushScene, k: int, row: PushPrimitive
 ) -> Iterator[tuple[FloatArray, float | None, tuple[int, ...]]]:
     """Paths of object ``k``, with the shift where it is given [m] and what is to be delivered."""
-    radius = float(scene.movables.radii[k])
-    away = row.clearance * scene.half if row.clearance > 0.0 else 0.75 * radius
-    path = scene.object_path(k, away, row.deep)
+    box = scene.poses[k, :2]
+    radii = scene.movables.radii
+    radius = float(radii[k])
+    away = row.clearance * scene.half
+    if not row.clearance:
+        away = _OWN_CLEARANCE * radius
+    path = scene.object_paths.path(box, radius, away, row.deep)
     if path is None:
         return
     if not row.partners:
-        if row.deep or not row.clearance:  # the same path again?
-            other = scene.object_path(k, 1.08 * scene.half)
+        if row.deep or not row.clearance:  # it may be the path of another row again
+            other = scene.object_paths.path(box, radius, PushPrimitive.clearance * scene.half)
             if other is not None and other.shape == path.shape:
                 if float(np.abs(other - path).max()) < 0.2 * radius:
                     return
         yield path, None, ()
         return
-    movables = scene.movables
     length = path_length(path)
-    far = np.hypot(*(scene.poses[:, :2] - scene.poses[k, :2]).T)
+    far = np.hypot(*(scene.poses[:, :2] - box).T)
     others = sorted((j for j in scene.left if j != k), key=lambda j: (far[j], j))
     for j in others[: row.partners]:
-        other = scene.object_path(j, away)
-        width = 0.75 * float(movables.radii[j] + movables.radii[k])
+        other = scene.object_paths.path(scene.poses[j, :2], float(radii[j]), away)
+        width = 0.75 * float(radii[j] + radii[k])
         if (
             other is None
             or width > 1.3 * scene.half
@@ -193,8 +176,8 @@ def _paths(
         _, v = heading_axes(heading)
         for side in (1.0, -1.0):
             beside = scene.poses[j, :2] - side * width * v
-            approach = beside - scene.poses[k, :2]
+            approach = beside - box
             turn = math.atan2(approach[1], approach[0]) - heading
             if abs(math.remainder(turn, math.tau)) <= 1.0:
-                points = np.array([scene.poses[k, :2], beside, *other[1:]])
+                points = np.array([box, beside, *other[1:]])
                 yield np.ascontiguousarray(points), side * 0.5 * width, (k, j)

@@ -1,7 +1,8 @@
-"""Compiled test of objects against their goal."""
+"""The goal of the objects for kernels, and the compiled test of objects against it."""
 
 from __future__ import annotations
 
+import functools
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +11,9 @@ from pushplan.compiled import kernel
 from pushplan.geometry import convex_penetration
 from pushplan.geometry.transforms import transform_points
 from pushplan.interaction.kernels import Bodies
-from pushplan.world.checks import BoolArray, FloatArray
+from pushplan.world import ClearanceArea, Goal, Receptacle, StaticMap
+from pushplan.world.checks import BoolArray, FloatArray, frozen
+from pushplan.world.outline import outward_normals
 
 REMOVED = 1e7
 """Coordinate of an object that a receptacle has taken [m]."""
@@ -24,6 +27,22 @@ class ObjectGoal(NamedTuple):
     """(E, 3) unit normal and offset of the edges within which a delivered object lies."""
     is_receptacle: bool  # True if objects have to get into the polygon, and are removed there
     slack: float  # By how much an object has to be clear of the polygon's edge [m]
+
+
+@functools.lru_cache(maxsize=8)
+def make_object_goal(goal: Goal, static: StaticMap, slack: float) -> ObjectGoal:
+    """The goal for kernels. Sides of a receptacle that lie on the bounds do not count."""
+    assert isinstance(goal, ClearanceArea | Receptacle)
+    polygon = goal.polygon
+    normals = outward_normals(polygon)
+    offsets = (normals * polygon).sum(axis=1)
+    corners = [[x, y] for x in static.bounds[::2] for y in static.bounds[1::2]]
+    # the sides of a receptacle that stand at the walls
+    inner = (np.array(corners) @ normals.T).max(axis=0) > offsets + 4.0 * slack
+    edges = np.column_stack([normals, offsets])[inner]
+    return ObjectGoal(
+        polygon, frozen(np.ascontiguousarray(edges)), isinstance(goal, Receptacle), slack
+    )
 
 
 @kernel

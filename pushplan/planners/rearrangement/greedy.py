@@ -12,12 +12,9 @@ from pushplan.control import LegFollower, Legs, Recovery
 from pushplan.control.recovery import warm_up_recovery
 from pushplan.geometry import VisibilityGraph
 from pushplan.planners.pushing import PushPath
-from pushplan.planners.rearrangement.push_execution import GeometricPusher, PathPush
-from pushplan.planners.rearrangement.push_scene import (
-    PushScene,
-    heading_axes,
-    initial_heading,
-)
+from pushplan.planners.rearrangement.push_controllers import GeometricPusher, PathPush
+from pushplan.planners.rearrangement.push_scene import PushScene
+from pushplan.planners.rearrangement.push_starts import heading_axes, initial_heading
 from pushplan.planners.rearrangement.rearrangement_policy import RearrangementPolicy
 from pushplan.world import StaticMap, Twist, World
 from pushplan.world.checks import FloatArray
@@ -121,14 +118,16 @@ class GreedyPusher(RearrangementPolicy):
             if place is not None:
                 driver = LegFollower(world.robot, place.legs, response=self.config.response)
                 pusher = GeometricPusher(scene.controller, place.shift)
-                return _Attempt(ids[k], driver, PathPush(scene, ids[k], place.path, pusher))
+                return _Attempt(ids[k], driver, PathPush(world.robot, ids[k], place.path, pusher))
             failures[ids[k]] += 1
         self._wait_until = world.time + _WAIT
         return None
 
     def _retreat(self, world: World) -> Twist | None:
         """Get away from where the last attempt ended."""
-        command = None if self._away is None else self._away.command(world, self._clock.held)
+        if self._away is None:
+            return None
+        command = self._away.command(world, self._clock.held)
         if command is None:
             self._away = None
         return command
@@ -155,7 +154,10 @@ def shortest_path(scene: PushScene, k: int) -> FloatArray | None:
     It keeps about half the object's width from static things where it can.
     """
     radius = float(scene.movables.radii[k])
-    found = (scene.object_path(k, clearance * radius, deep) for clearance, deep in _PATHS)
+    found = (
+        scene.object_paths.path(scene.poses[k, :2], radius, clearance * radius, deep)
+        for clearance, deep in _PATHS
+    )
     return next((path for path in found if path is not None), None)
 
 
@@ -185,7 +187,7 @@ def line_up(scene: PushScene, k: int, skip: int = 0) -> LineUp | None:
         for turn, fraction in _STARTS:
             heading = towards + turn
             shift = fraction * scene.half
-            start = scene.pose_behind(k, heading, shift)
+            start = scene.starts.behind(k, heading, shift)
             legs = _legs_to(scene, around, start, clearance)
             if legs is not None:
                 found.append(LineUp(PushPath.through(path), shift, legs))
@@ -206,7 +208,7 @@ def _legs_to(
     """
     behind = start[:2]
     heading = float(start[2])
-    if not scene.fits(start):
+    if not scene.starts.fits(start):
         return None
     for lean in _LEANS:
         stop = behind - 1.05 * scene.size * heading_axes(heading + lean)[0]
@@ -214,7 +216,7 @@ def _legs_to(
             np.array([*place, heading + angle])
             for place, angle in ((behind, lean), (behind, 0.5 * lean), (stop, lean))
         ]
-        if not all(scene.fits(pose) for pose in poses):
+        if not all(scene.starts.fits(pose) for pose in poses):
             continue
         path = VisibilityGraph(around, clearance).shortest_path(scene.world.robot_pose[:2], stop)
         if math.isfinite(path.length):

@@ -1,4 +1,4 @@
-"""`GtspMpc`: sequence, approach, push, look, sequence anew."""
+"""`GtspMpc`: observe, recover, choose, approach and push; then all of it again."""
 
 from __future__ import annotations
 
@@ -30,6 +30,8 @@ from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.world import InvalidInputError, Plan, PlanningExecutor, Stop, Twist, World
 from pushplan.world.checks import FloatArray, expect
 
+_SAME_PLACE = 0.02  # the robot has not moved if by less [circumscribed radii, rad]
+_MOST_ENDS = 4  # pushes and recoveries that may end in one step until the robot waits
 _RETREAT = 0.3  # distance that the robot backs off where it is stuck [circumscribed radii]
 
 
@@ -79,14 +81,15 @@ class GtspMpc(RearrangementPolicy):
         self._choosing: PendingChoice | None = None
         self._execution: PushExecution | None = None
         self._shown: Push | None = None
-        self._away: Callable[[World, float], Twist | None] | None = None
+        self._recovery: Callable[[World, float], Twist | None] | None = None
+        self._searched: PushScene | None = None
         self._cache = RolloutCache()
         self._history = PushHistory()
         self._left = -1
         self._rounds = 0
         self._stuck = 0
         self._way_at_end = math.inf
-        self._recovered_from: FloatArray | None = None
+        self._recovered_from: FloatArray = np.full(3, np.inf)
         self._stopped_at: PushScene | None = None
         self.given_up: dict[int, str] = {}
         self.plan: tuple[Push, ...] = ()
@@ -115,15 +118,8 @@ class GtspMpc(RearrangementPolicy):
         super().warm_up()
 
     def _act(self, world: World) -> Twist:
-        scene = PushScene(world, self.config, self._cache)
-        left = len(scene.left)
-        if left != self._left:  # something was done, or has come back
-            self._left = left
-            self._rounds = 0
-            self._stopped_at = None
-            self._way_at_end = math.inf
-            self._history.count_progress(self.config)
-        if not left:
+        scene = self._observe(world)
+        if not scene.left:
             self._execution = None
             self.given_up = {}
             self.plan = ()
@@ -132,32 +128,71 @@ class GtspMpc(RearrangementPolicy):
             return Twist(0.0, 0.0)
         if self._stopped_at is not None and _alike(scene, self._stopped_at):
             return Twist(0.0, 0.0)
-        searched = False
-        held = self._clock.held
-        for _ in range(4):  # jobs that end at once
-            if self._away is not None:
-                away = self._away(world, held)
-                if away is not None:
-                    return away
-                self._away = None
-            if self._execution is None:
-                if self._choosing is None:
-                    if searched:  # one search a step is enough
-                        break
-                    self._choosing = choose_push(
-                        scene, self._history, self._executor, self.stop, self.costs
-                    )
-                    searched = True
-                if not self._take_up_choice(scene):
+        for _ in range(_MOST_ENDS):
+            command = self._recover(world)
+            if command is None:
+                if self._execution is None and not self._choose(scene):
                     break
-            if self._execution is not None:
-                command = self._execution.command(scene, held)
-                if isinstance(command, Twist):
-                    self._show(scene.world, self._execution)
-                    self._choose_ahead(scene, self._execution)
-                    return command
-                self._close(scene, self._execution, command)
+                command = self._approach_and_push(scene)
+            if command is not None:
+                return command
         return Twist(0.0, 0.0)
+
+    def _observe(self, world: World) -> PushScene:
+        """Look at the scene, and notice what has been done since the last look."""
+        scene = PushScene(world, self.config, self._cache)
+        left = len(scene.left)
+        if left != self._left:  # something was done, or has come back
+            self._left = left
+            self._rounds = 0
+            self._stopped_at = None
+            self._way_at_end = math.inf
+            self._history.count_progress(self.config)
+        return scene
+
+    def _recover(self, world: World) -> Twist | None:
+        """The next command of a recovery; None where none is under way."""
+        if self._recovery is None:
+            return None
+        command = self._recovery(world, self._clock.held)
+        if command is None:
+            self._recovery = None
+        return command
+
+    def _choose(self, scene: PushScene) -> bool:
+        """Choose a push and begin with it, or with a recovery.
+
+        Returns:
+            False if there is nothing to do, or the choice is not there yet.
+        """
+        if self._choosing is None:
+            if self._searched is scene:  # one search a step is enough
+                return False
+            self._searched = scene
+            self._choosing = choose_push(
+                scene, self._history, self._executor, self.stop, self.costs
+            )
+        choosing = self._choosing
+        if not choosing.fits(scene):
+            self._forget_choice()
+            return True
+        if not choosing.call.ready(scene.world.time):
+            return False
+        self._choosing = None
+        return self._begin(scene, choosing.call.result())
+
+    def _approach_and_push(self, scene: PushScene) -> Twist | None:
+        """The next command of the push in hand; None where there is none, or it has ended."""
+        execution = self._execution
+        if execution is None:
+            return None
+        command = execution.command(scene, self._clock.held)
+        if isinstance(command, Twist):
+            self._choose_ahead(scene, execution)
+            self._show(scene.world, execution)
+            return command
+        self._close(scene, execution, command)
+        return None
 
     def _show(self, world: World, execution: PushExecution) -> None:
         """Make `current_plan` that of the push in hand, once for the way and once for the push."""
@@ -180,45 +215,35 @@ class GtspMpc(RearrangementPolicy):
                     expected, self._history, self._executor, self.stop, self.costs, ahead=True
                 )
 
-    def _take_up_choice(self, scene: PushScene) -> bool:
-        """Begin with what was chosen, if it is there; whether there may be anything to do."""
-        choosing = self._choosing
-        assert choosing is not None
-        if not choosing.fits(scene):
-            self._forget_choice()
-            return True
-        if not choosing.call.ready(scene.world.time):
-            return False
-        self._choosing = None
-        return self._begin(scene, choosing.call.result())
-
     def _forget_choice(self) -> None:
         if self._choosing is not None:
             self._choosing.call.abandon()
         self._choosing = None
 
     def _begin(self, scene: PushScene, choice: PushChoice) -> bool:
-        """Take up the best push, or else leave a tight place; whether there is anything to do."""
+        """Take up the best push, or else recover; False if there is nothing to do."""
         self.graph = choice.graph
         self.plan = choice.plan
         self.given_up = dict(choice.graph.infeasible)
         if choice.first is not None:
             push = choice.first.push
             self._execution = PushExecution(
-                scene,
                 push,
                 choice.first.route,
+                scene.world.robot,
+                self.config,
                 self._executor,
                 predictive=self.config.mpc and signature(push) not in self._history.failures,
             )
             return True
         here = scene.world.robot_pose
-        before = self._recovered_from
-        moved = before is None or bool(np.abs(before - here).max() > 0.02 * scene.size)
-        if choice.way_out is not None and moved:
+        moved = np.abs(self._recovered_from - here).max() > _SAME_PLACE * scene.size
+        if choice.recovery is not None and moved:
             self._recovered_from = here
-            follower = PoseFollower(scene.world.robot, choice.way_out, self.config.response)
-            self._away = lambda world, held: follower.command(world.robot_pose, world.time, held)
+            follower = PoseFollower(scene.world.robot, choice.recovery, self.config.response)
+            self._recovery = lambda world, held: follower.command(
+                world.robot_pose, world.time, held
+            )
             self._cache = RolloutCache()  # that nothing was found is no longer true out there
             return True
         if choice.interrupted:  # the next search begins with what is known by now
@@ -261,7 +286,7 @@ class GtspMpc(RearrangementPolicy):
             self._history.count_relocation(push)
         if end is ExecutionEnd.STUCK:
             distance = _RETREAT * scene.size
-            self._away = Recovery(
+            self._recovery = Recovery(
                 scene.world, distance, skip=self._stuck, looks=False, searches=False
             ).command
             self._stuck += 1

@@ -10,7 +10,8 @@ from pushplan.control import LegFollower, Legs, clamp_twist
 from pushplan.geometry import VisibilityGraph
 from pushplan.gtsp import solve_gtsp
 from pushplan.motion.keep_out import keep_out
-from pushplan.planners.rearrangement.push_scene import PushScene, open_edges
+from pushplan.planners.rearrangement.candidates import open_edges
+from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.rearrangement_policy import (
     RearrangementPolicy,
     warm_up_rearrangement,
@@ -51,7 +52,7 @@ class Gtsp(RearrangementPolicy):
         while command is None and not follower.arrived:
             follower.skip()
             command = follower.command(pose, world.time, self._clock.held)
-        return clamp_twist(world.robot, 0.0, 0.0) if command is None else command
+        return command or clamp_twist(world.robot, 0.0, 0.0)
 
     def _path(self, world: World) -> Legs:
         """The whole path: for each object of the tour, behind it and then to the edge."""
@@ -94,5 +95,5 @@ def _pushes(scene: PushScene, k: int) -> list[tuple[int, FloatArray, FloatArray]
     else:
         assert isinstance(goal, Receptacle)
         moves = [goal.polygon.mean(axis=0) - box]
-    starts = [scene.pose_behind(k, math.atan2(move[1], move[0]), 0.0)[:2] for move in moves]
+    starts = [scene.starts.behind(k, math.atan2(move[1], move[0]), 0.0)[:2] for move in moves]
     return [(k, start, start + move) for start, move in zip(starts, moves, strict=True)]

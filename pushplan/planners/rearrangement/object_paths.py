@@ -16,6 +16,7 @@ from scipy.sparse.csgraph import dijkstra
 from pushplan.geometry import GoalDistances, goal_distances
 from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.done_places import done_places
+from pushplan.planners.rearrangement.goal_kernels import REMOVED
 from pushplan.planners.rearrangement.pose_grid_kernels import LENGTHS, MOVES
 from pushplan.planners.rearrangement.push_pose_kernels import pushable_moves
 from pushplan.planners.rearrangement.rearrangement_config import SHIFTS
@@ -59,6 +60,12 @@ class ObjectPaths:
         """
         return self._paths(*point.tolist(), round(radius, 9), clearance, deep)
 
+    def remaining(self, poses: FloatArray) -> FloatArray:
+        """(K,) length of the shortest path from poses (K, 3) to the goal [m]; 0 once removed."""
+        return np.array(
+            [0.0 if x >= 0.5 * REMOVED else self.length(x, y) for x, y, _ in poses.tolist()]
+        )
+
 
 def _distances(
     static: StaticMap, goal: Goal, radius: float, clearance: float, deep: bool
@@ -67,7 +74,9 @@ def _distances(
     if isinstance(goal, Receptacle) and (deep or places is None):
         middle = goal.polygon.mean(axis=0)
         places = [np.stack([middle, middle])]
-    return None if places is None else goal_distances(static, places, clearance=clearance)
+    if places is None:
+        return None
+    return goal_distances(static, places, clearance=clearance)
 
 
 def _path(

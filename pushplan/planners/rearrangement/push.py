@@ -42,7 +42,7 @@ class Push(ArrayRecord):
         object_path: (M, 2) of the target object [m].
         shift: how far the robot's middle is to the left of the target object [m].
         gain: of the pushing controller, see `PushingController`.
-        relocates: whether it only brings its target to where it can be pushed from, or nearer home.
+        relocates: it only brings its target to where it can be pushed from, or nearer home.
     """
 
     delivers: tuple[int, ...]

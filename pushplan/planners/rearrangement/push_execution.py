@@ -4,132 +4,25 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Callable
 
 import numpy as np
 
-from pushplan.control import (
-    EpisodeClock,
-    LegFollower,
-    PoseFollower,
-    ProgressChecker,
-    StallChecker,
-    decrease_by,
-)
-from pushplan.control.limits import arc_twist
-from pushplan.planners.pushing import PushingConfig, PushingMpc, PushParameters, PushPath
+from pushplan.control import LegFollower, StallChecker
 from pushplan.planners.rearrangement.approach import Route
-from pushplan.planners.rearrangement.controller_kernels import (
-    PushingController,
-    is_on_bumper,
-    steer_push,
-)
 from pushplan.planners.rearrangement.push import Push
-from pushplan.planners.rearrangement.push_scene import PushScene, initial_heading
+from pushplan.planners.rearrangement.push_controllers import Pusher, make_pusher
+from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.push_simulator import resimulate
-from pushplan.world import PendingResult, Plan, PlanningExecutor, Twist, World
-from pushplan.world.checks import FloatArray, expect
+from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
+from pushplan.world import PendingResult, PlanningExecutor, RobotModel, Twist
+from pushplan.world.checks import IntArray
 
 _ALIGNED = math.radians(0.4)  # error of a heading that is left where a push begins
-_MPC_HEADING = math.radians(20.0)
-"""A push that begins farther off the object's path is left to the geometric controller."""
 _NEAR = 0.004  # error of the place that is left where a push begins [circumscribed radii]
-_PROGRESS = 0.05
-"""By so much an object has to get on in the time in which the robot could drive a radius, or turn
-by `_TURN_PATIENCE` [circumscribed radii]."""
-_TURN_PATIENCE = 0.15  # [rad]
-
-
-class GeometricPusher:
-    """Pushes the object of a plan along its path, as fast as the robot can turn that way.
-
-    It heads for a point ahead on the path, turned towards the side to which the object has slipped
-    on the bumper. An object that has gone from the world was delivered: the robot drives straight
-    on then, for what rides along.
-
-    Args:
-        controller: parameters.
-        shift: how far the robot's middle is meant to be to the left of the object [m].
-
-    Attributes:
-        along: length of the path that the object has been pushed [m].
-    """
-
-    def __init__(self, controller: PushingController, shift: float = 0.0) -> None:
-        self._controller = controller
-        self._shift = shift
-        self._clock = EpisodeClock(1.0)
-        self._plan: Plan | None = None
-        self.along = 0.0
-
-    def reset(self, world: World) -> None:
-        """See `pushplan.world.Controller`."""
-        self._clock.reset()
-        self._plan = None
-
-    def command(self, world: World, plan: Plan) -> Twist:
-        """See `pushplan.world.Controller`; the plan is one of `PushPath.plan`."""
-        expect("plan", plan, Plan)
-        world = expect("world", world, World)
-        return self._clock.command_for(world, lambda _: self._follow(world, plan))
-
-    def _follow(self, world: World, plan: Plan) -> Twist:
-        if plan is not self._plan:
-            self._plan = plan
-            self.along = 0.0
-            self._path = np.ascontiguousarray(plan.poses[:, :2])
-        found = np.flatnonzero(world.movables.ids == plan.subtasks[0].object_ids[0])
-        step = self._controller.step
-        turn = 0.0
-        if len(found):
-            step, turn, self.along, _ = steer_push(
-                np.array(world.robot_pose),
-                np.array(world.movables.poses[found[0]]),
-                self._path,
-                self.along,
-                self._shift,
-                self._controller,
-            )
-        return arc_twist(world.robot, step, turn)
-
-
-class PathPush:
-    """Pushes an object along a path while it stays on the bumper and gets on.
-
-    Args:
-        scene: as the push begins.
-        target: id of the object.
-        path: of its middle.
-        pusher: chooses the velocities.
-    """
-
-    def __init__(
-        self, scene: PushScene, target: int, path: PushPath, pusher: GeometricPusher | PushingMpc
-    ) -> None:
-        robot = scene.world.robot
-        self._plan = path.plan(robot, target)
-        self._pusher = pusher
-        patience = max(scene.size / robot.max_speed, _TURN_PATIENCE / robot.max_turn_rate)
-        self._progress = ProgressChecker(decrease_by(_PROGRESS * scene.size), patience)
-
-    def command(self, scene: PushScene, held: float) -> Twist | None:
-        """The velocity to drive now; None where the object has been lost or does not get on.
-
-        It goes on with an object that is done, for what rides along.
-        """
-        world = scene.world
-        twist = self._pusher.command(world, self._plan)
-        target = self._plan.subtasks[0].object_ids[0]
-        remaining = self._plan.length - self._pusher.along
-        for k in np.flatnonzero((world.movables.ids == target) & ~scene.done):
-            holds = is_on_bumper(np.array(world.robot_pose), scene.poses[k], scene.controller)
-            if not (holds and self._progress.update(remaining, world.time)):
-                return None
-        return twist
-
-
-Pusher = Callable[[PushScene, float], Twist | None]
-"""From the scene and for how long a command is held [s] to the velocity; None at the end."""
+_LONGER = 1.1
+_FARTHER = 0.4
+"""A push home has failed that is longer than predicted by this factor and by this distance
+[circumscribed radii]."""
 
 
 class ExecutionEnd(enum.Enum):
@@ -149,25 +42,27 @@ class PushExecution:
     """Carries out one push.
 
     Args:
-        scene: the scene in which it begins.
         push: the push.
         route: to its start.
+        robot: its limits.
+        config: settings.
         executor: runs the prediction of the push from where the route has led to.
-        predictive: whether to push by predictive control where that suits.
+        predictive: push by predictive control where that suits.
 
     Attributes:
         push: the push, as predicted last.
         route: to its start.
-        pushing: whether the push itself has begun.
+        pushing: the push itself has begun.
         ids: (K,) of the objects that the prediction of the push is about.
-        asked_for_next: whether what comes after it has been asked for.
+        asked_for_next: what comes after it has been asked for.
     """
 
     def __init__(
         self,
-        scene: PushScene,
         push: Push,
         route: Route,
+        robot: RobotModel,
+        config: RearrangementConfig,
         executor: PlanningExecutor,
         *,
         predictive: bool = True,
@@ -175,17 +70,15 @@ class PushExecution:
         self.push = push
         self.route = route
         self.pushing = False
-        self.ids = scene.movables.ids
+        self.ids: IntArray = np.zeros(0, dtype=np.int64)
         self.asked_for_next = False
         self._executor = executor
         self._predictive = predictive
         self._prediction: PendingResult[list[Push]] | None = None
-        robot = scene.world.robot
-        config = scene.config
         self._route_follower = LegFollower(
             robot,
             route,
-            near=_NEAR * scene.size + config.position_noise,
+            near=_NEAR * robot.circumscribed_radius + config.position_noise,
             aligned=_ALIGNED + config.heading_noise,
             response=config.response,
         )
@@ -245,32 +138,8 @@ class PushExecution:
             good, key=lambda end: (len(set(end.delivers) & set(push.delivers)), -end.length)
         )
         self.pushing = True
-        self._pusher = self._choose_pusher(scene, held)
+        self._pusher = make_pusher(scene, self.push, held, self._predictive)
         return True
-
-    def _choose_pusher(self, scene: PushScene, held: float) -> Pusher:
-        """Return the controller of the push, for its poses, its line or the path of its object."""
-        push = self.push
-        config = scene.config
-        world = scene.world
-        if push.controller == "arc":
-            follower = PoseFollower(world.robot, push.poses, config.response)
-            return lambda now, held: follower.command(now.world.robot_pose, now.world.time, held)
-        if push.controller == "line":
-            return lambda now, _: _along_line(now, push.start)
-        away = initial_heading(push.object_path, 0.5 * scene.size) - float(world.robot_pose[2])
-        straight = abs(math.remainder(away, math.tau)) < _MPC_HEADING
-        # the contact model of `PushingMpc` is that of one object, along its path
-        alone = not push.relocates and push.delivers == (push.target,)
-        if self._predictive and alone and straight:
-            path = PushPath.through(push.object_path, radius=scene.size)
-            parameters = PushParameters(config.friction)
-            mpc = PushingMpc(PushingConfig(parameters=parameters, period=held))
-            return PathPush(scene, push.target, path, mpc).command
-        controller = scene.controller._replace(gain=push.gain)
-        path = PushPath.through(push.object_path)
-        pusher = GeometricPusher(controller, push.shift)
-        return PathPush(scene, push.target, path, pusher).command
 
     def _push(self, scene: PushScene, held: float) -> Twist | ExecutionEnd:
         push = self.push
@@ -284,17 +153,9 @@ class PushExecution:
         self._driven += (time - self._sent_at) * self._speed
         self._sent_at = time
         self._speed = 0.0
-        longest = push.length if push.relocates else 1.1 * push.length + 0.4 * scene.size
+        longest = push.length
+        if not push.relocates:
+            longest = _LONGER * push.length + _FARTHER * scene.size
         if self._driven > longest - 1e-6:
             return ExecutionEnd.DONE if push.relocates else ExecutionEnd.FAILED
         return self._pusher(scene, held) or ExecutionEnd.FAILED
-
-
-def _along_line(scene: PushScene, start: FloatArray) -> Twist:
-    """The velocity that keeps the robot on the line of a push that began at a pose (3,)."""
-    pose = scene.world.robot_pose
-    error = math.remainder(float(start[2] - pose[2]), math.tau)
-    away = pose[:2] - start[:2]
-    left = float(math.cos(start[2]) * away[1] - math.sin(start[2]) * away[0])
-    turn = 0.5 * error - 0.3 * left / scene.size
-    return arc_twist(scene.world.robot, scene.controller.step, turn)

@@ -1,4 +1,4 @@
-"""`PushGraph`: candidate pushes, what they deliver, what lies between them, and their best order.
+"""`PushGraph`: the candidate pushes of a scene, what they deliver, and what lies between them.
 
 **Reduction.** To deliver all objects is a problem of set covering. As a generalised travelling
 salesman problem, each object is a cluster. A push that takes one object along is one node. A push
@@ -12,20 +12,26 @@ path.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations, pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pushplan.gtsp import solve_gtsp
-from pushplan.planners.rearrangement.approach import ApproachTree
-from pushplan.planners.rearrangement.cost_to_go_kernels import MAX_EXACT, MAX_OBJECTS, cost_to_go
+from pushplan.planners.rearrangement.approach import (
+    ApproachTree,
+    approach_tree,
+    arrivals_at,
+    search_approaches,
+)
+from pushplan.planners.rearrangement.candidates import delivering_pushes, partial_pushes
+from pushplan.planners.rearrangement.cost_to_go_kernels import MAX_OBJECTS
+from pushplan.planners.rearrangement.pose_search_kernels import least_costs
 from pushplan.planners.rearrangement.push import Push
-from pushplan.world import MaxIterations
+from pushplan.planners.rearrangement.push_scene import PushScene
+from pushplan.planners.rearrangement.relocation import relocating_pushes
 from pushplan.world.checks import FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -33,6 +39,9 @@ if TYPE_CHECKING:
 
 _PARTS = 3
 """Pushes that take more than so many objects along stand for all of them and for each one alone."""
+_MOST_APPROACHES = 150
+"""Ends of pushes from which approaches are searched for; up to 50 objects have no more."""
+_FAR = 5.0  # cost of getting to what cannot be got to later [diagonals of the map]
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,94 +171,115 @@ class PushGraph:
         return graph
 
 
-def _order_after(
-    following: IntArray, masks: IntArray, mask: int, last: int, order: list[int]
-) -> list[int]:
-    """An order, gone on with the cheapest pushes after what is delivered and the last push."""
-    while following[mask, last] >= 0:
-        last = int(following[mask, last])
-        mask |= int(masks[last])
-        order.append(last)
-    return order
+def no_penalty(push: Push) -> float:
+    """Nothing."""
+    return 0.0
 
 
-def push_order(graph: PushGraph, iterations: int = 300) -> tuple[list[int], float]:
-    """The cheapest order of pushes that is found: their indices, and its cost [m].
-
-    Objects without a push are left out. Up to `MAX_EXACT` objects the order is the cheapest there
-    is; beyond, `solve_gtsp` searches for one on the reduced problem.
-    """
-    count = len(graph.objects)
-    if not count:
-        return [], 0.0
-    if count <= MAX_EXACT:
-        best, following = cost_to_go(graph.costs, graph.masks, count)
-        start = len(graph.pushes)
-        return _order_after(following, graph.masks, 0, start, []), float(best[0, start])
-    reduced = graph.to_gtsp()
-    tour = solve_gtsp(reduced.costs, reduced.clusters, stop=MaxIterations(iterations))
-    if not tour.status.has_tour:
-        return [], math.inf
-    return reduced.order([int(node) for node in tour.nodes]), float(tour.cost)
-
-
-SimulatedCost = Callable[[int], tuple[float, tuple[int, ...]] | None]
-"""From the index of a push to its cost from where the robot is now [m], and what it then delivers;
-None where the search has to return with what is simulated by now."""
-
-
-def sequence_pushes(graph: PushGraph, simulated_cost: SimulatedCost, most: int) -> list[int]:
-    """The order of pushes, with the first one simulated.
-
-    The graph knows approaches roughly. The push that the cheapest order begins with is
-    simulated, until no other order could be cheaper.
+def build_push_graph(
+    scene: PushScene,
+    penalty: Callable[[Push], float] = no_penalty,
+    *,
+    onward: bool = False,
+    relocations: int = 0,
+    thorough: bool = False,
+) -> PushGraph:
+    """Make the candidate pushes of a scene and their costs.
 
     Args:
-        graph: the pushes and their costs.
-        simulated_cost: simulates a push.
-        most: how many pushes are simulated at most.
+        scene: the scene.
+        penalty: what to add to the cost of a push [m].
+        onward: pushes are wanted too that only bring an object nearer to its goal.
+        relocations: for how many objects, the nearest ones first, drives that only bring them to
+            where they can be pushed home from are wanted too.
+        thorough: look for ones that cost much more than the best one.
     """
-    count = len(graph.objects)
-    if not count:
-        return []
-    if count > MAX_EXACT:
-        return _by_tours(graph, simulated_cost, most)
-    best, following = cost_to_go(graph.costs, graph.masks, count)
-    rest = np.array([best[graph.masks[n], n] for n in range(len(graph.masks))])
-    guess = graph.costs[-1] + rest
-    chosen = -1
-    value = math.inf
-    mask = 0
-    for n in np.argsort(guess, kind="stable").tolist()[:most]:
-        if guess[n] >= value:
-            break
-        found = simulated_cost(n)
-        if found is None:
-            break
-        cost, delivers = found
-        after = graph.mask(delivers) | int(graph.masks[n])
-        total = cost + float(best[after, n])
-        if total < value:
-            chosen = n
-            value = total
-            mask = after
-    return _order_after(following, graph.masks, mask, chosen, [chosen]) if chosen >= 0 else []
+    approach = approach_tree(scene)
+    pushes = candidate_pushes(scene, approach, onward, relocations, thorough)
+    row = least_costs(approach.costs, arrivals_at(scene.fine.grid, pushes))
+    extra = np.array([penalty(push) for push in pushes])
+    keep = _best(scene, pushes, row + extra)
+    pushes = [pushes[n] for n in keep]
+    row = row[keep]
+    push_costs = np.array([push.cost for push in pushes]) + extra[keep]
+    costs = np.zeros((1, 0))
+    if pushes:
+        costs = np.vstack([_between(scene, pushes), row[None]]) + push_costs[None]
+    delivered = {i for n, push in enumerate(pushes) if np.isfinite(row[n]) for i in push.serves}
+    infeasible = {
+        i: "no push for it was found that the robot can get to"
+        for i in scene.movables.ids[scene.left].tolist()
+        if i not in delivered
+    }
+    return PushGraph(tuple(pushes), costs, approach, infeasible)
 
 
-def _by_tours(graph: PushGraph, simulated_cost: SimulatedCost, most: int) -> list[int]:
-    """As `sequence_pushes`, with a tour anew for every push that is simulated."""
-    costs: FloatArray = graph.costs.copy()
-    known: dict[int, float] = {}
-    for _ in range(most):
-        order, total = push_order(replace(graph, costs=costs))
-        if not order or not math.isfinite(total):
+def candidate_pushes(
+    scene: PushScene,
+    approach: ApproachTree,
+    onward: bool = False,
+    relocations: int = 0,
+    thorough: bool = False,
+) -> list[Push]:
+    """All candidates of a scene; the arguments are those of `build_push_graph`."""
+    away = np.hypot(*(scene.poses[:, :2] - scene.world.robot_pose[:2]).T)
+    objects = sorted(scene.left, key=lambda k: (float(away[k]), k))
+    pushes = delivering_pushes(scene, objects)
+    if onward:
+        pushes += [push for k in objects for push in partial_pushes(scene, k)]
+    for k in objects:
+        if not relocations or scene.budget.is_used_up:
             break
-        if order[0] in known:
-            return order
-        found = simulated_cost(order[0])
-        if found is None:
-            costs[-1, [n for n in range(costs.shape[1]) if n not in known]] = np.inf
-        else:
-            known[order[0]] = costs[-1, order[0]] = found[0]
-    rest = [n for n in known if math.isfinite(known[n])]
-    return [min(rest, key=lambda n: (known[n] / len(graph.pushes[n].serves), n))] if rest else []
+        found = relocating_pushes(scene, k, approach, thorough)
+        pushes += found
+        relocations -= bool(found)
+    return pushes
+
+
+def _best(scene: PushScene, pushes: Sequence[Push], row: FloatArray) -> list[int]:
+    """Indices of the best few pushes for each object, of those that the robot can get to."""
+    keep: set[int] = set()
+    shares = [max(1, len(push.delivers)) for push in pushes]
+    order = sorted(
+        (n for n in range(len(pushes)) if np.isfinite(row[n])),
+        key=lambda n: (pushes[n].cost / shares[n], n),
+    )
+    near = sorted(order, key=lambda n: (row[n] + pushes[n].cost) / shares[n])
+    ids = scene.movables.ids[scene.left].tolist()
+    count = min(scene.config.per_object, max(2, scene.config.max_pushes // max(1, len(ids))))
+    for i in ids:
+        keep.update([n for n in order if i in pushes[n].serves][:count])
+        keep.update([n for n in near if i in pushes[n].serves][: count // 2])
+    return sorted(keep)
+
+
+def _between(scene: PushScene, pushes: Sequence[Push]) -> FloatArray:
+    """(N, N) cost of the approach from the end of each push to the start of each other [m].
+
+    What cannot be got to from there, as far as one can say now, is put off rather than ruled out:
+    otherwise one object would be enough for there to be no order at all.
+    """
+    grid = scene.coarse.grid
+    ids = scene.movables.ids
+    bounds = scene.world.static.bounds
+    far = _FAR * float(np.hypot(*(bounds[2:] - bounds[:2])))
+    arrivals = arrivals_at(grid, pushes)
+    out = np.full((len(pushes), len(pushes)), far)
+    known: dict[tuple[object, ...], FloatArray] = {}
+    step = 2.0 * grid.step
+    for n, push in enumerate(pushes):
+        key = (
+            push.delivers,
+            *np.round(push.end[:2] / step).tolist(),
+            round(float(push.end[2]) / 0.8),
+        )
+        if key not in known:
+            if len(known) == _MOST_APPROACHES or scene.budget.is_over:
+                continue
+            weights = scene.config.later_fraction * scene.contact_weights
+            weights[np.isin(ids, push.delivers)] = 0.0
+            found = search_approaches(scene, scene.coarse, push.end, weights, arrivals.nodes)
+            known[key] = least_costs(found.costs, arrivals)
+        out[n] = np.minimum(known[key], far)
+    np.fill_diagonal(out, np.inf)
+    return out

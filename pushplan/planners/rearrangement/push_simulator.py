@@ -40,7 +40,7 @@ class PushAttempt:
         wanted: indices of the objects after which to stop; ``target`` alone by default.
         gain: of the pushing controller.
         friction: coefficient between robot and objects; that of the config by default.
-        relocates: whether only the end counts, whatever is done then.
+        relocates: only the end counts, whatever is done then.
     """
 
     start: FloatArray
@@ -74,7 +74,9 @@ def simulate(
     for s in range(len(rollout.steps))[-1 if attempt.relocates else 0 :]:
         done = all_done(rollout.poses[s], scene.bodies, scene.object_goal)
         delivered = done & ~scene.done
-        homeward = delivered[attempt.target] if follows_path else delivered.any()
+        homeward = delivered.any()
+        if follows_path:
+            homeward = delivered[attempt.target]
         if (scene.done & ~done).any() or not (attempt.relocates or homeward):
             continue  # something came back, or nothing is won
         track = rollout.track[: int(rollout.steps[s])]
@@ -126,9 +128,10 @@ def _roll_out(scene: PushScene, attempt: PushAttempt, poses: FloatArray | None) 
     )
     is_now = poses is None and not (wanted & scene.done).any()
     cache = scene.cache if is_now else None
-    known = None if cache is None else cache.find(key, movables, scene.poses)
-    if known is not None:
-        return known
+    if cache is not None:
+        known = cache.find(key, movables, scene.poses)
+        if known is not None:
+            return known
     scene.budget.used += 1
     longest = int(scene.longest / scene.controller.step) + 2
     shapes = ((longest, 3), (STAGES,), (STAGES, count, 3), (STAGES, count), (4,))
@@ -218,7 +221,7 @@ def _push(
     moved = np.flatnonzero((lengths > 1e-9) & ~done)
     if len(moved):
         now = scene.remaining_now[moved]
-        then = scene.remaining(after[moved])
+        then = scene.object_paths.remaining(after[moved])
         known = np.isfinite(now) & np.isfinite(then)
         change = np.full(len(moved), scene.longest)
         change[known] = then[known] - now[known]
@@ -252,7 +255,7 @@ def resimulate(
         spent: see `simulate`.
     """
     ids = scene.movables.ids
-    target = scene.index_of(push.target)
+    target = int(np.flatnonzero(ids == push.target)[0])
     if push.controller == "arc":
         path = np.vstack([start, push.poses[1:]])
         path[:, 2] = np.unwrap(path[:, 2])

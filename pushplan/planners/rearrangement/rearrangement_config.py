@@ -35,7 +35,7 @@ class PushPrimitive(CheckedFields):
         gains: of the pushing controller that follows the path.
         clearance: distance that the path keeps from what is static [half widths of the bumper]; 0
             for 0.75 radii of the object.
-        deep: whether the path goes to the middle of a receptacle instead of its nearest place.
+        deep: the path goes to the middle of a receptacle instead of its nearest place.
         partners: by how many of its neighbours, the nearest ones, the path leads past, to take one
             along.
         frictions: coefficients between robot and object with which it has to succeed as well, see
@@ -90,7 +90,7 @@ class RearrangementConfig(CheckedFields):
         max_searches: how many objects relocations are searched for before one is chosen.
         response: time in which an error of heading or place is driven off [s]; longer than the
             robot's delay.
-        mpc: whether a push of one object along its path is driven by `PushingMpc`; else by the
+        mpc: a push of one object along its path is driven by `PushingMpc`; else by the
             controller of its prediction, as all other pushes are.
         max_failures: after so many a push waits until something else has been done.
         max_relocations: after so many an object waits until something else has been done.

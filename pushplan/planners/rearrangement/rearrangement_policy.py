@@ -56,7 +56,7 @@ class RearrangementPolicy(ABC):
         Raises:
             InvalidInputError: if the goal is one for the robot, or the robot cannot stop.
         """
-        check_pusher(world)
+        check_pusher(world)  # before the clock takes the snapshot
         return self._clock.command_for(world, self._act)
 
     def _forget(self) -> None:

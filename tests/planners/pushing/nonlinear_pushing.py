@@ -12,17 +12,18 @@ import numpy as np
 
 from pushplan.control.mpc.tracking_kernels import errors, locate
 from pushplan.geometry.obstacles import obstacles_of
-from pushplan.planners.pushing.contact_kernels import FLUSH, Contact, box_pose
+from pushplan.planners.pushing.box_motion_kernels import FLUSH, box_pose
+from pushplan.planners.pushing.contact_kernels import Contact
 from pushplan.planners.pushing.cost_kernels import SPEED_SMOOTHNESS, PushingProblem, Weights
 from pushplan.planners.pushing.mpc import PushingMpc
 from pushplan.planners.pushing.problem_kernels import assemble
 from pushplan.planners.pushing.push_kernels import (
-    VALUE,
     drive_push,
     observe_push,
     problem_now,
     send_push,
 )
+from pushplan.planners.pushing.push_observer_kernels import VALUE
 from pushplan.world import RobotModel, World
 from pushplan.world.checks import FloatArray, IntArray
 

@@ -11,7 +11,7 @@ from pushplan.envs.registry import SIMULATORS
 from pushplan.envs.simulators.base import Materials, Simulator
 from pushplan.envs.tasks.presets import SOLIDS
 from pushplan.imports.on_demand import look_up
-from pushplan.planners.pushing import PushModel, PushPath, PushState, contact_kernels
+from pushplan.planners.pushing import PushModel, PushPath, PushState, box_motion_kernels
 from pushplan.world import Episode, Movables, Receptacle, RobotModel, StaticMap, Twist, World
 
 SQUARE = 0.5 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
@@ -66,7 +66,7 @@ def best_offset(model: PushModel, path: PushPath, speed: float) -> float:
         if length < 1e-9:
             continue
         turn = math.remainder(float(path.poses[i, 2] - path.poses[i - 1, 2]), math.tau)
-        contact_kernels.advance(
+        box_motion_kernels.advance(
             model.contact, state, speed, turn * speed / length, length / speed, out
         )
         if max(high, state[3]) - min(low, state[3]) > 1.2 * half:

@@ -14,6 +14,7 @@ from pushplan.planners.pushing import (
     PushModel,
     PushParameters,
     PushState,
+    box_motion_kernels,
     contact_kernels,
     face_towards,
     pressure_radius,
@@ -255,8 +256,8 @@ def test_nonlinear_expressions_are_those_of_the_kernels():
             found = np.asarray(made(row[:5], [v, w, 0.1])).ravel()
             for _ in range(2):
                 c, s = math.cos(row[4]), math.sin(row[4])
-                contact_kernels._push(model.contact, row, c, s, v, w, 0.05, np.empty(6))
-                contact_kernels._drive(row, v, w, 0.05)
+                box_motion_kernels._push(model.contact, row, c, s, v, w, 0.05, np.empty(6))
+                box_motion_kernels._drive(row, v, w, 0.05)
             assert found == pytest.approx(row[:5], abs=1e-9)
 
 

@@ -7,7 +7,8 @@ from conftest import make_boxes, make_u_maze
 from pushplan.envs import PushEnv
 from pushplan.planners import make_policy
 from pushplan.planners.rearrangement.greedy import GreedyPusher, line_up, shortest_path
-from pushplan.planners.rearrangement.push_scene import PushScene, initial_heading
+from pushplan.planners.rearrangement.push_scene import PushScene
+from pushplan.planners.rearrangement.push_starts import initial_heading
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.world import (
     ClearanceArea,
@@ -79,7 +80,7 @@ def test_path_and_place_behind_a_box():
     low = push_scene(scene([(0.0, -4.49, 0.0)]))
     push = line_up(low, 0)
     assert abs(push.legs.heading - goal_heading(low.world)) > 0.4 or push.shift != 0.0
-    assert low.fits(np.array([*push.legs.points[-1], push.legs.heading]))
+    assert low.starts.fits(np.array([*push.legs.points[-1], push.legs.heading]))
     around = scene([(0.0, 0.0, 0.0)], extra=[[(1.0, -5.0), (1.5, -5.0), (1.5, 2.0), (1.0, 2.0)]])
     assert goal_heading(around) > 0.9  # up and over the wall
 

@@ -10,9 +10,9 @@ from pushplan.interaction.kernels import sweep_path
 from pushplan.planners.pushing import PushPath
 from pushplan.planners.rearrangement import PushScene, RearrangementConfig
 from pushplan.planners.rearrangement.goal_kernels import all_done
-from pushplan.planners.rearrangement.push_execution import GeometricPusher
-from pushplan.planners.rearrangement.push_scene import initial_heading
+from pushplan.planners.rearrangement.push_controllers import GeometricPusher
 from pushplan.planners.rearrangement.push_simulator import PushAttempt, simulate
+from pushplan.planners.rearrangement.push_starts import initial_heading
 from pushplan.world import (
     Controller,
     Movables,
@@ -55,7 +55,7 @@ def test_the_geometric_pusher_does_what_was_predicted():
     )
     scene = PushScene(world, RearrangementConfig())
     path = np.array([(-1.0, 0.5), (1.0, 0.5), (4.0, 4.0)])
-    start = scene.pose_behind(0, initial_heading(path, 0.5 * scene.size), 0.0)
+    start = scene.starts.behind(0, initial_heading(path, 0.5 * scene.size), 0.0)
     [push] = simulate(scene, PushAttempt(start, 0, scene.longest, path))
     controller = GeometricPusher(scene.controller._replace(gain=push.gain), push.shift)
     assert isinstance(controller, Controller)

@@ -33,8 +33,12 @@ from pushplan.planners.rearrangement.pose_grid_kernels import (
 )
 from pushplan.planners.rearrangement.pose_search_kernels import PoseSearchProblem, search_poses
 from pushplan.planners.rearrangement.push import signature
-from pushplan.planners.rearrangement.push_choice import candidate_pushes, select_push
-from pushplan.planners.rearrangement.push_graph import parts_of, reduce_to_gtsp
+from pushplan.planners.rearrangement.push_choice import select_push
+from pushplan.planners.rearrangement.push_graph import (
+    candidate_pushes,
+    parts_of,
+    reduce_to_gtsp,
+)
 from pushplan.planners.rearrangement.push_simulator import resimulate, simulate_primitive
 from pushplan.planners.rearrangement.relocation import relocating_pushes
 from pushplan.planners.rearrangement.rollout_cache import RolloutCache
@@ -68,7 +72,7 @@ def bodies_along(path, robot):
     ]
 
 
-def way_out(here):
+def recovery_from(here):
     return recovery_path(here.world, 0.015 * here.size)
 
 
@@ -305,7 +309,7 @@ def test_a_box_in_a_tight_place_is_brought_out_of_it(pose, extra, drive_back):
     assert found or not drive_back
     walls = [shapely.Polygon(part).buffer(-0.01) for part in here.world.static.convex_parts]
     for push in found:
-        assert push.relocates and here.is_clear(push.start)
+        assert push.relocates and here.starts.is_clear(push.start)
         assert math.dist(push.object_poses[0, :2], pose[:2]) > 0.02
         assert np.abs(np.diff(push.poses, axis=0)).max() < 0.3 * here.size
         for robot_pose in push.poses:
@@ -321,10 +325,10 @@ def test_a_box_in_a_tight_place_is_brought_out_of_it(pose, extra, drive_back):
 
 def test_the_recovery_path_of_a_gap_touches_nothing():
     tight = small_box((0.0, 0.25, 0.0), GAP, robot=(0.0, -0.35, -0.5 * math.pi))
-    path = way_out(tight)
+    path = recovery_from(tight)
     assert path is not None and path[-1, 1] < -0.8
     assert simulate_primitive(tight, path, 0)[0].work == 0.0
-    assert way_out(small_box((0.0, 0.8, 0.0), GAP)) is None
+    assert recovery_from(small_box((0.0, 0.8, 0.0), GAP)) is None
 
 
 def test_the_recovery_path_from_between_two_columns_is_to_and_fro():
@@ -332,7 +336,7 @@ def test_the_recovery_path_from_between_two_columns_is_to_and_fro():
     columns = columns_at((0.0, 0.0), (0.0, 2.0))
     for pose in ((0.8, 1.47, -1.57), (0.4, 1.5, 1.4)):
         tight = scene([(4.0, -4.0, 0.0)], extra=columns, pose=pose)
-        path = way_out(tight)
+        path = recovery_from(tight)
         assert path is not None and len(path) > 20
         moves = np.diff(path, axis=0)
         assert np.abs(moves[:, 2]).max() < 0.1 and np.hypot(*moves[:, :2].T).max() < 0.1
@@ -340,14 +344,14 @@ def test_the_recovery_path_from_between_two_columns_is_to_and_fro():
         bodies = bodies_along(path, tight.world.robot)
         assert shapely.area(shapely.intersection(walls, bodies)).max() < 1e-3
         assert shapely.distance(walls, shapely.Point(path[-1, :2])) > tight.size
-        assert np.array_equal(path, way_out(tight))
+        assert np.array_equal(path, recovery_from(tight))
 
 
 def test_the_recovery_path_of_a_wedged_robot_leads_deeper_into_neither_column():
     """The bumper is 4 mm in one, 15 mm from the other, and the only way out is a slight bend."""
     columns = columns_at((-2.1318, 0.7832), (-0.1196, 1.3619))
     tight = scene([(4.0, -4.0, 0.0)], extra=columns, pose=(-0.5417, 1.7491, -1.7874))
-    path = way_out(tight)
+    path = recovery_from(tight)
     assert path is not None
     bodies = bodies_along(path, tight.world.robot)
     for column in columns:
@@ -360,7 +364,7 @@ def test_the_recovery_path_pushes_what_closes_the_only_way_out():
     walls = [side, [(x, -y) for x, y in side], [(-1, -1), (-0.6, -1), (-0.6, 1), (-1, 1)]]
     for box, pushes in (((4.0, 4.0, 0.0), False), ((0.5, 0.0, 0.0), True)):
         tight = scene([box], extra=walls, pose=(-0.2, 0.0, 0.0))
-        path = way_out(tight)
+        path = recovery_from(tight)
         assert path is not None and path[-1, 0] > 0.8
         work = simulate_primitive(tight, path, 0)[0].work
         assert (work > 0.0) == pushes
@@ -400,7 +404,7 @@ def test_there_is_no_recovery_path_out_of_a_cell():
     sides = [[(-1, -1), (1, -1), (1, -0.9), (-1, -0.9)], [(-1, 0.9), (1, 0.9), (1, 1), (-1, 1)]]
     sides += [[(-1, -1), (-0.9, -1), (-0.9, 1), (-1, 1)], [(0.9, -1), (1, -1), (1, 1), (0.9, 1)]]
     cell = [1.4 * 0.45 * np.array(side) for side in sides]
-    assert way_out(scene([(4.0, -4.0, 0.0)], extra=cell, pose=(0.0, 0.0, 0.0))) is None
+    assert recovery_from(scene([(4.0, -4.0, 0.0)], extra=cell, pose=(0.0, 0.0, 0.0))) is None
 
 
 def test_an_object_that_cannot_be_got_to_later_does_not_keep_the_others_waiting():
@@ -420,7 +424,7 @@ def test_an_object_that_cannot_be_got_to_later_does_not_keep_the_others_waiting(
 def test_a_bumper_that_hooks_on_a_corner_is_driven_ahead():
     column = [(-0.75, 0.47), (0.25, 0.47), (0.25, 1.47), (-0.75, 1.47)]
     hooked = scene([(4.0, -4.0, 0.0)], extra=[column], pose=(0.0, 0.0, 0.0))
-    path = way_out(hooked)
+    path = recovery_from(hooked)
     assert path is not None and path[1, 0] > 0.0
     parts = [
         shapely.Polygon(transform(pose, part)) for pose in path for part in hooked.world.robot.parts

@@ -82,7 +82,9 @@ def test_ways_among_columns_touch_nothing():
         pose = np.array([*rng.uniform((-4.5, -2.0), (4.5, 1.5)), rng.uniform(-math.pi, math.pi)])
         scene = among_columns(pose)
         target = np.array([*rng.uniform((-4.5, -2.0), (3.0, 1.5)), rng.uniform(-math.pi, math.pi)])
-        if not (scene.fits(pose) and scene.is_clear(pose) and scene.fits(target)):
+        if not (
+            scene.starts.fits(pose) and scene.starts.is_clear(pose) and scene.starts.fits(target)
+        ):
             continue
         asked += 1
         route = find_route(scene, approach_tree(scene), target)
