@@ -20,7 +20,13 @@ from ompl import base, control, util
 from pushplan.compiled import copy_into, kernel
 from pushplan.motion.collision import ConvexObstacles, Footprint, is_free
 from pushplan.motion.dubins import along_arc, step_along
-from pushplan.motion.random_tree.ompl_lock import ompl_alone, own_state, plane_bounds
+from pushplan.motion.random_tree.ompl_calls import (
+    GoalRegion,
+    grow_to,
+    ompl_alone,
+    own_state,
+    plane_bounds,
+)
 from pushplan.world import NavigationGoal
 from pushplan.world.checks import FloatArray
 
@@ -137,23 +143,16 @@ class TreeGrowth:
         info.setPropagationStepSize(1.0)
         info.setMinMaxControlDuration(1, 1)
         info.setup()
-        problem = base.ProblemDefinition(info)
         start = own_state(_state_space)
         _write(self.start, start)
         start[_HEADING].value = _wrap(self.start[2])
         start[_DRIVEN][_LENGTH] = start[_DRIVEN][_BACK] = 0.0
-        problem.addStartState(start)
-        region = _Region(info, self)
-        problem.setGoal(region)
         planner = control.RRT(info)
         planner.setGoalBias(1.0)  # every target comes from `targets`
-        planner.setProblemDefinition(problem)
         util.RNG.setSeed(seed)  # for the samplers, which are made from here on
-        planner.setup()
-        planner.solve(base.PlannerTerminationCondition(done))
-        if not problem.hasExactSolution():
+        path = grow_to(GoalRegion(info, self._aim, self._distance), planner, start, done)
+        if path is None:
             return None
-        path = problem.getSolutionPath()
         ends = path.getStates()[1:]
         return np.array(
             [
@@ -192,24 +191,13 @@ class TreeGrowth:
         result[_DRIVEN][_BACK] = back - min(length, 0.0)
         action[0] = curvature
 
+    def _aim(self, state: base.State) -> None:
+        """Write the next target, which `_propagate` drives towards."""
+        self.target[:] = self.targets()
+        _write(self.target, state)
 
-class _Region(base.GoalSampleableRegion):
-    """Hands OMPL our targets, and tells it when a state is in the goal."""
-
-    def __init__(self, info: control.SpaceInformation, growth: TreeGrowth) -> None:
-        super().__init__(info)
-        self.growth = growth
-        self.setThreshold(np.finfo(np.float64).tiny)  # only a distance of 0 is below
-
-    def sampleGoal(self, state: base.State) -> None:
-        self.growth.target[:] = self.growth.targets()
-        _write(self.growth.target, state)
-
-    def maxSampleCount(self) -> int:
-        return 1_000_000_000
-
-    def distanceGoal(self, state: base.State) -> float:
-        return float(self.growth.goal.distance(state[_PLACE][0], state[_PLACE][1]))
+    def _distance(self, state: base.State) -> float:
+        return self.goal.distance(state[_PLACE][0], state[_PLACE][1])
 
 
 def _state_space(turn_weight: float = 1.0) -> base.CompoundStateSpace:

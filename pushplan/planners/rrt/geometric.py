@@ -12,7 +12,13 @@ from pushplan.geometry import core_distance
 from pushplan.motion.collision import ConvexObstacles, obstacles
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.polyline_plan import polyline_plan, polyline_status
-from pushplan.motion.random_tree.ompl_lock import ompl_alone, own_state, plane_bounds
+from pushplan.motion.random_tree.ompl_calls import (
+    GoalRegion,
+    grow_to,
+    ompl_alone,
+    own_state,
+    plane_bounds,
+)
 from pushplan.motion.speed_profile import goal_is_outside, start_margin
 from pushplan.world import MaxIterations, NavigationGoal, PlanResult, PlanStatus, Stop, World
 from pushplan.world.checked_fields import CheckedFields, PositiveFloat, PositiveInt
@@ -20,6 +26,7 @@ from pushplan.world.checks import FloatArray, expect
 from pushplan.world.planning_call import PlanningCall
 
 _GOAL_BIAS = 0.1  # fraction of samples that are drawn from the goal
+_GOAL_TRIES = 30  # random points among which one in the goal is looked for
 _STEP = 1.0  # longest edge of the tree [R]
 _RESOLUTION = 0.1  # distance between collision checks along an edge [R]
 _SPACING = 0.15  # distance between the poses of the plan [R]
@@ -127,64 +134,39 @@ class GeometricRRT:
             step = _RESOLUTION * size / space.getMaximumExtent()
             info.setStateValidityCheckingResolution(min(step, 0.5))
             info.setup()
-            problem = base.ProblemDefinition(info)
             start = own_state(_plane)
             start[0] = float(world.robot_pose[0])
             start[1] = float(world.robot_pose[1])
-            problem.addStartState(start)
-            region = _GoalRegion(info, world.navigation_goal, among.bounds, rng)
-            problem.setGoal(region)
             planner = geometric.RRT(info)
             planner.setRange(_STEP * size)
             planner.setGoalBias(_GOAL_BIAS)
-            planner.setProblemDefinition(problem)
-            planner.setup()
-            planner.solve(base.PlannerTerminationCondition(done))
-            if not problem.hasExactSolution():
+
+            def draw(state: base.State) -> None:
+                state[0], state[1] = _goal_point(world.navigation_goal, among.bounds, rng).tolist()
+
+            def distance(state: base.State) -> float:
+                return world.navigation_goal.distance(state[0], state[1])
+
+            path = grow_to(GoalRegion(info, draw, distance), planner, start, done)
+            if path is None:
                 return None, used
-            states = problem.getSolutionPath().getStates()
-            return np.array([[state[0], state[1]] for state in states]), used
+            return np.array([[state[0], state[1]] for state in path.getStates()]), used
 
 
 def _plane() -> base.RealVectorStateSpace:
     return base.RealVectorStateSpace(2)
 
 
-class _GoalRegion(base.GoalSampleableRegion):
-    """The goal as OMPL wants it: points to grow towards, and whether a point is inside."""
-
-    def __init__(
-        self,
-        info: base.SpaceInformation,
-        goal: NavigationGoal,
-        bounds: FloatArray,
-        rng: np.random.Generator,
-    ) -> None:
-        super().__init__(info)
-        self.goal = goal
-        self.bounds = bounds
-        self.rng = rng
-        self.setThreshold(np.finfo(np.float64).tiny)  # only a distance of 0 is below
-
-    def sampleGoal(self, state: base.State) -> None:
-        low = self.bounds[:2]
-        high = self.bounds[2:]
-        point = low + self.rng.random(2) * (high - low)
-        for _ in range(30):
-            candidate = low + self.rng.random(2) * (high - low)
-            if self.goal.contains(candidate):
-                point = candidate
-                break
-        else:
-            point = np.clip(getattr(self.goal, "center", point), low, high)
-        state[0] = float(point[0])
-        state[1] = float(point[1])
-
-    def maxSampleCount(self) -> int:
-        return 1_000_000_000
-
-    def distanceGoal(self, state: base.State) -> float:
-        return self.goal.distance(state[0], state[1])
+def _goal_point(goal: NavigationGoal, bounds: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """A random point (2,) of the goal; its centre, or any point, where it is too small to be met."""
+    low = bounds[:2]
+    high = bounds[2:]
+    point: FloatArray = low + rng.random(2) * (high - low)
+    for _ in range(_GOAL_TRIES):
+        candidate: FloatArray = low + rng.random(2) * (high - low)
+        if goal.contains(candidate):
+            return candidate
+    return np.clip(getattr(goal, "center", point), low, high)
 
 
 @kernel(allocates=True)
