@@ -158,7 +158,7 @@ def _plane() -> base.RealVectorStateSpace:
 
 
 def _goal_point(goal: NavigationGoal, bounds: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """A random point (2,) of the goal; its centre, or any point, where it is too small to be met."""
+    """A random point (2,) of the goal; its centre or any other where it is too small to be met."""
     low = bounds[:2]
     high = bounds[2:]
     point: FloatArray = low + rng.random(2) * (high - low)

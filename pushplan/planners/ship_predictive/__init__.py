@@ -2,7 +2,6 @@
 
 from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
 from pushplan.planners.ship_predictive.predictive_published import PredictivePublished
-from pushplan.planners.ship_predictive.predictive_ship import PredictiveShip
-from pushplan.planners.ship_predictive.predictive_ship_network import PredictiveShipNetwork
+from pushplan.planners.ship_predictive.predictive_ship import PredictiveShip, PredictiveShipNetwork
 
 __all__ = ["PredictiveConfig", "PredictivePublished", "PredictiveShip", "PredictiveShipNetwork"]

@@ -19,7 +19,7 @@ from pushplan.planners.ship_predictive.ice_cost_to_go import (
     fill_table,
 )
 from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
-from pushplan.world import GoalLine, InvalidInputError, World
+from pushplan.world import GoalLine, InvalidInputError, PlanStatus, World
 from pushplan.world.checks import FloatArray, IntArray
 from pushplan.world.outline import areas_and_centroids
 
@@ -45,6 +45,15 @@ class ChannelView:
     length: float  # of the hull [m]
     radius: float  # least turning radius [m]
     curvatures: FloatArray  # (B,) that the search uses [1/m]
+
+    @property
+    def closed(self) -> PlanStatus | None:
+        """The status of a call in which no path is possible; None where one may be."""
+        if not self.inside(self.start[None]):
+            return PlanStatus.START_BLOCKED
+        if self.away > self.channel.high[1]:
+            return PlanStatus.GOAL_UNREACHABLE
+        return None
 
     def to_world(self, poses: FloatArray) -> FloatArray:
         """Carry (..., 3) poses from the frame of the channel to the world's."""
@@ -174,11 +183,10 @@ def _costs_to_go(
         table=np.empty((rows, columns, HEADINGS)),
         field=np.empty((math.ceil((away + 3.0 * length) / cell) + 1, 2 * columns - 1)),
         left=float(channel.low[0]),
-        low=-length,  # the table begins a hull length behind the ship
+        low=-length,  # the tables begin a hull length behind the ship
         column=column,
         row=ahead / (rows - 1),
         cell=cell,
-        field_low=-length,
         bow=0.7 * float(vertices[:, 0].max()),
         mass=world.robot.mass,
         weight=float(config.push_weight),

@@ -31,13 +31,12 @@ class IceCostToGo(NamedTuple):
     """Costs to go, and what they were made from; lengths in metres."""
 
     table: FloatArray  # (R, C, H) cost from each row, column and heading to the goal line [kg m]
-    field: FloatArray  # (F, C) mass ahead of the bow [kg], rows from ``field_low``
-    left: float  # x of the first column
-    low: float  # y of the first row
+    field: FloatArray  # (F, D) mass ahead of the bow [kg], on smaller cells
+    left: float  # x of the first column of both
+    low: float  # y of the first row of both
     column: float  # Distance between the columns of the table
     row: float  # Distance between the rows of the table
     cell: float  # Distance between the rows and the columns of the field
-    field_low: float  # y of its first row; its first column is that of the table
     bow: float  # Distance ahead of the ship's origin at which its bow meets ice
     mass: float  # Of the ship [kg]
     weight: float  # w, cost of work against travel
@@ -63,7 +62,7 @@ def fill_field(floes: Floes, out: IceCostToGo) -> None:
     for k in range(floes.poses.shape[0]):
         reach = floes.half_beam + floes.radii[k]
         x = (floes.poses[k, 0] - out.left) / out.cell
-        y = (floes.poses[k, 1] - out.field_low) / out.cell
+        y = (floes.poses[k, 1] - out.low) / out.cell
         span = reach / out.cell
         for r in range(max(0, math.ceil(y - span)), min(rows - 1, math.floor(y + span)) + 1):
             for c in range(max(0, math.ceil(x - span)), min(columns - 1, math.floor(x + span)) + 1):
@@ -97,7 +96,7 @@ def mass_ahead(costs: IceCostToGo, x: float, y: float, theta: float) -> float:
     bx = x + costs.bow * math.cos(theta)
     by = y + costs.bow * math.sin(theta)
     cell = costs.cell
-    return _sample(costs.field, (by - costs.field_low) / cell, (bx - costs.left) / cell)
+    return _sample(costs.field, (by - costs.low) / cell, (bx - costs.left) / cell)
 
 
 @kernel

@@ -69,10 +69,8 @@ class PredictiveCall:
         """Search until done or stopped."""
         beam = self.beam
         view = self.beam.view
-        if not view.inside(view.start[None]):
-            return PlanStatus.START_BLOCKED
-        if view.away > view.channel.high[1]:
-            return PlanStatus.GOAL_UNREACHABLE
+        if view.closed is not None:
+            return view.closed
         if view.channel.goal <= 0.0:
             self._consider(beam.root())
             return PlanStatus.SOLVED

@@ -58,10 +58,8 @@ class PredictivePublished:
         self.network.load()
         call.arm()
         view = channel_view(world, PredictiveConfig(margin=0.0), IceInteraction())
-        if not view.inside(view.start[None]):
-            return call.result(PlanStatus.START_BLOCKED)
-        if view.away > view.channel.high[1]:
-            return call.result(PlanStatus.GOAL_UNREACHABLE)
+        if view.closed is not None:
+            return call.result(view.closed)
         if view.away <= 0.0:
             plan = timed_path(world, world.robot_pose[None], np.zeros(1))
             return call.result(PlanStatus.SOLVED, plan, call.elapsed)

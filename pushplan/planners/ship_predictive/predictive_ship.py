@@ -1,14 +1,20 @@
-"""`PredictiveShip`: through ice by predicting what each path does to it."""
+"""`PredictiveShip` and `PredictiveShipNetwork`: through ice by predicting what paths do to it."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import ClassVar
+from functools import partial
+from typing import Any, ClassVar
 
 import numpy as np
 
 from pushplan.interaction.ice_interaction import IceInteraction
+from pushplan.interaction.network import IceNetwork
+from pushplan.planners.ship_predictive.beam_node import StatePropagator
+from pushplan.planners.ship_predictive.channel_view import ChannelView
 from pushplan.planners.ship_predictive.floe_propagator import FloePropagator
+from pushplan.planners.ship_predictive.map_propagator import MapPropagator
 from pushplan.planners.ship_predictive.predictive_call import plan_call
 from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
 from pushplan.world import PlanResult, Stop, World
@@ -55,4 +61,41 @@ class PredictiveShip:
             InvalidInputError: if the goal is no line, or something static is in the water.
         """
         call = PlanningCall(world, stop, rng)
-        return plan_call(call, self.config, self.interaction, FloePropagator)
+        return plan_call(call, self.config, self.interaction, self._propagator(call))
+
+    def _propagator(self, call: PlanningCall) -> Callable[[ChannelView], StatePropagator[Any]]:
+        """Makes what carries the ice along the paths of a call."""
+        return FloePropagator
+
+
+NETWORK_CONFIG = PredictiveConfig(arc=0.4, curvatures=2, width=6, widest=24, sparse=0)
+"""Fewer and longer pieces than by default, as the network takes longer to predict one."""
+
+
+@dataclass(frozen=True)
+class PredictiveShipNetwork(PredictiveShip):
+    """`PredictiveShip` with a network that predicts occupancy and work from occupancy.
+
+    The ice is carried as a map, which the network changes piece by piece; the pieces of a layer
+    of the beam are predicted eight in a call. Use it where only an occupancy map is known, or to
+    compare. A network that cannot be read is an `InvalidInputError` of ``plan``.
+
+    Args:
+        config: parameters.
+        interaction: sweeps the plan that is returned, for its prediction; the search does not
+            use it.
+        network: predicts; the shipped weights by default.
+    """
+
+    config: PredictiveConfig = NETWORK_CONFIG
+    network: IceNetwork = field(default_factory=IceNetwork)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        expect("network", self.network, IceNetwork)
+
+    def _propagator(self, call: PlanningCall) -> Callable[[ChannelView], StatePropagator[Any]]:
+        """Makes maps of the ice; what a process loads once does not count against a deadline."""
+        self.network.load()
+        call.arm()
+        return partial(MapPropagator, network=self.network)
