@@ -81,7 +81,9 @@ def _plan_in(worlds: str, policy: PlanFollower, iterations: int) -> None:
 
 def _plan_and_follow(policy: PlanFollower, world: World) -> None:
     planner = policy.planner
-    enough = planner.warm_up_iterations if isinstance(planner, CountsIterations) else _ITERATIONS
+    enough = _ITERATIONS
+    if isinstance(planner, CountsIterations):
+        enough = planner.warm_up_iterations
     planner.plan(world, stop=MaxIterations(enough))
     fewer = MaxIterations(min(enough, _ITERATIONS))
     policy.stop = fewer

@@ -116,12 +116,10 @@ def _made(kind: str, name: str, table: Mapping[str, str], options: dict[str, Any
         if option not in names:
             raise UnknownNameError(f"option of {kind} {name!r}", option, [*known, *names])
     changed: Any = replace(settings, **changes)
-    if settings is not owner:
-        changed = (
-            replace(cast(Any, owner), config=changed)
-            if is_dataclass(owner)
-            else type(owner)(changed)
-        )
+    if settings is not owner and is_dataclass(owner):
+        changed = replace(cast(Any, owner), config=changed)
+    elif settings is not owner:
+        changed = type(owner)(changed)
     if owner is made:
         return changed
     made.planner = changed

@@ -66,8 +66,9 @@ class ShortestPath:
                 plan = polyline_plan(world, path.points, spacing)
                 status = polyline_status(world, plan)
                 return call.result(status, plan, call.elapsed, looks)
-        blocked = start_margin(world, 0.0) is None
-        return call.result(PlanStatus.START_BLOCKED if blocked else PlanStatus.GOAL_UNREACHABLE)
+        if start_margin(world, 0.0) is None:
+            return call.result(PlanStatus.START_BLOCKED)
+        return call.result(PlanStatus.GOAL_UNREACHABLE)
 
 
 def straight(planner: Planner | None = None) -> PlanFollower:

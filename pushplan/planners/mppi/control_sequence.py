@@ -68,8 +68,10 @@ def resting(
 
 def first_spread(robot: RobotModel, config: MppiConfig) -> FloatArray:
     """(M, 2) standard deviation of the noise at the knots."""
-    speed = 0.0 if robot.drive is Drive.CONSTANT_SPEED else config.speed_noise
-    return np.tile([speed, config.turn_noise], (config.knots, 1))
+    spread = np.tile([config.speed_noise, config.turn_noise], (config.knots, 1))
+    if robot.drive is Drive.CONSTANT_SPEED:
+        spread[:, SPEED] = 0.0
+    return spread
 
 
 def draw(

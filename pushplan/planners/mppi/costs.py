@@ -20,6 +20,8 @@ from pushplan.world.checks import FloatArray
 _CELL = 0.3  # side of a cell of distance fields [R]
 _MOST_CELLS = 20_000
 _UNDONE = 0.5  # value of an object that is done: driving over this part of the map's diagonal
+_GOAL_MISSED = 200.0  # cost of a collision to a robot that misses its own goal then [R]
+_HELD_UP = 20.0  # the same to one whose objects have the goal: it can go on [R]
 _DONE = 0.25  # distance up to which an object counts as done [cells]
 
 
@@ -174,14 +176,11 @@ def navigation_costs(world: World, config: MppiConfig) -> list[RolloutCost]:
     """Terms for a robot that has a goal itself."""
     robot = world.robot
     goal_weight = 3.0 if config.goal_weight is None else config.goal_weight
-    collision = 200.0 if config.collision_cost is None else config.collision_cost
     cell = _cell(world, robot.circumscribed_radius)
     field = robot_field(world.static, world.navigation_goal, robot.inscribed_radius, cell)
-    return [
-        DrivingCost(config.push_weight),
-        CollisionCost(collision * robot.mass * robot.circumscribed_radius),
-        GoalCost(field, goal_weight * robot.mass),
-    ]
+    costs = _driving_costs(world, config, _GOAL_MISSED)
+    costs.append(GoalCost(field, goal_weight * robot.mass))
+    return costs
 
 
 def manipulation_costs(
@@ -194,18 +193,24 @@ def manipulation_costs(
         config: settings.
         approach: to the object that is to be pushed; None if there is none.
     """
-    robot = world.robot
     goal_weight = 2.0 if config.goal_weight is None else config.goal_weight
-    collision = 20.0 if config.collision_cost is None else config.collision_cost
     objects = object_cost(world, config.push_weight, goal_weight)
-    costs: list[RolloutCost] = [
-        DrivingCost(config.push_weight),
-        CollisionCost(collision * robot.mass * robot.circumscribed_radius),
-        objects,
-    ]
+    costs = _driving_costs(world, config, _HELD_UP)
+    costs.append(objects)
     if approach is not None:
         costs.append(ApproachCost(approach, objects, goal_weight))
     return costs
+
+
+def _driving_costs(world: World, config: MppiConfig, collision: float) -> list[RolloutCost]:
+    """Terms of every task; a collision costs so much [R] where the settings leave it open."""
+    robot = world.robot
+    if config.collision_cost is not None:
+        collision = config.collision_cost
+    return [
+        DrivingCost(config.push_weight),
+        CollisionCost(collision * robot.mass * robot.circumscribed_radius),
+    ]
 
 
 def object_cost(world: World, push_weight: float, goal_weight: float) -> ObjectCost:

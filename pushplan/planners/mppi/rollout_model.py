@@ -69,11 +69,9 @@ class RolloutModel:
         self.period = step_length(world, config)
         self.world = _nearby(world, config.steps * self.period)
         self.interaction = default_model(world) if interaction is None else interaction
-        self.compiled = (
-            self.interaction.compiled(self.world)
-            if isinstance(self.interaction, CompiledInteraction) and len(self.world.movables)
-            else None
-        )
+        self.compiled = None
+        if isinstance(self.interaction, CompiledInteraction) and len(self.world.movables):
+            self.compiled = self.interaction.compiled(self.world)
         self._matrix = interpolation(config.steps, config.knots)
         self._objects = owned(self.world.movables.poses)
         driven = driven_twist(world)
@@ -169,14 +167,17 @@ def _problem(world: World, config: MppiConfig, period: float) -> RolloutProblem:
         corners = np.empty_like(shape.vertices)
         if is_free(start, shape, walls, corners):
             break
-    goal = world.goal
+    has_goal = isinstance(world.goal, GoalDisc | GoalLine)
+    goal = np.zeros(5)  # not read where the robot has none
+    if has_goal:
+        goal = goal_numbers(world.navigation_goal, 0.0)
     return RolloutProblem(
         float(period),
         max(1, math.ceil(max(turn / _TURN, length / _LENGTH) - 1e-9)),
         limits,
         shape,
         walls,
-        goal_numbers(goal, 0.0) if isinstance(goal, GoalDisc | GoalLine) else np.zeros(5),
-        isinstance(goal, GoalDisc | GoalLine),
+        goal,
+        has_goal,
         float(static_depth(start, shape, walls, corners)),
     )

@@ -63,7 +63,7 @@ class TargetChoice:
         movables = world.movables
         robot = world.robot
         points = _way_of_object(world, k).points
-        steps = np.hypot(*(points - points[:1]).T) if len(points) else np.zeros(0)
+        steps = np.hypot(*(points - points[:1]).T)
         ahead = np.flatnonzero(steps > 0.02 * robot.circumscribed_radius)
         if not len(ahead):
             return None

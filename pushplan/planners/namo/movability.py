@@ -58,8 +58,10 @@ class Movability:
         if self._stall.update(world.robot_pose, world.time) and self._ahead:
             self.stopped_by |= self._touched(world) - self.seen_moving
         self.stopped_by -= self.seen_moving
-        told = set(objects.ids[objects.fixed].tolist()) if self._has_prior else set()
-        return self.stopped_by | (told - self.seen_moving)
+        believed = set(self.stopped_by)
+        if self._has_prior:
+            believed |= set(objects.ids[objects.fixed].tolist()) - self.seen_moving
+        return believed
 
     def send(self, command: Twist) -> None:
         """Take the command that is driven until the next update."""

@@ -207,8 +207,10 @@ def _estimate(lattice: PushLattice, number: int) -> float:
     """Return the estimated cost to go; the arc of a guess is paid when it is driven."""
     tree = lattice.tree
     node = number >> 1
-    paid = tree.costs[node] if number % 2 == 1 else tree.costs[tree.parents[node]]
-    left: float = tree.estimates[node] - paid
+    paid = node
+    if number % 2 == 0:
+        paid = tree.parents[node]
+    left: float = tree.estimates[node] - tree.costs[paid]
     return left
 
 

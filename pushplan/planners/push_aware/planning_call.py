@@ -267,10 +267,10 @@ class PushAwareSearch:
 
     def _one_round(self) -> None:
         """Paths of two trees: around the objects, and among them at a weight that varies."""
-        factor = (
-            float(np.exp(_COST_SIGMA * self.rng.standard_normal())) if self.trees.trees else 1.0
-        )
-        for candidate in self.trees.grow_two(self.config.push_weight * factor):
+        push_weight = self.config.push_weight
+        if self.trees.trees:  # the first two take the weight as it is
+            push_weight *= float(np.exp(_COST_SIGMA * self.rng.standard_normal()))
+        for candidate in self.trees.grow_two(push_weight):
             self._finish(candidate)
 
     def _finish(self, candidate: Candidate) -> None:

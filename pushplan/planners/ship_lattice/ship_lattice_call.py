@@ -108,15 +108,18 @@ class ShipLatticeCall:
                     with suppress(Stopped):
                         self._improve(builder)
                 assert self.built is not None
-                return PlanStatus.SOLVED if self.built.arrives else PlanStatus.APPROXIMATE
+                if not self.built.arrives:
+                    return PlanStatus.APPROXIMATE
+                return PlanStatus.SOLVED
         if self.stopped():
             return None
         room = Room(shape, walls, goal_numbers(self.goal, 0.0), 0.0)
         if not gets_away(room, owned(world.robot_pose), self.size, world.robot.turning_radius):
             return PlanStatus.START_BLOCKED
         # the lattice is coarse: where it leads nowhere there may be a path nevertheless
-        leads_on = reachable(world, self.stopped)
-        return None if leads_on or self.stopped() else PlanStatus.GOAL_UNREACHABLE
+        if reachable(world, self.stopped) or self.stopped():
+            return None
+        return PlanStatus.GOAL_UNREACHABLE
 
     def _limits(self) -> list[tuple[float, float]]:
         """Fractions of the turn rate and distances from the bounds [m] to try in turn."""

@@ -47,7 +47,7 @@ class ShipPathImprover:
         first: int = 0,  # last pose that it shares with ``base``
         base: SweptCandidate | None = None,  # its prediction holds up to there
     ) -> bool:
-        """Find the cost of a path and keep it if it is the cheapest so far; whether it was kept."""
+        """Find the cost of a path; keep it and return True if it is the cheapest so far."""
         moves = np.diff(poses[:, :2], axis=0)
         lengths = np.concatenate([[0.0], np.cumsum(np.sqrt((moves * moves).sum(axis=1)))])
         limit = np.inf if self.best is None else self.best.cost
@@ -83,15 +83,16 @@ class ShipPathImprover:
         return True
 
     def shortcut(self, rng: np.random.Generator) -> bool:
-        """Try one random change of the best path; whether it was kept."""
+        """Try one random change of the best path; return True if it was kept."""
         assert self.best is not None
         best = self.best
         count = len(best.poses)
-        part = count if len(best.objects) >= count else len(best.objects)
+        part = min(count, len(best.objects))
         out = np.empty((2 * part + 60, 3))
         curvatures = np.zeros(2 * part + 60)
-        # where only a part is swept, its end is not the end of the path
-        problem = self.problem if part == count else self.problem._replace(end_fraction=0.0)
+        problem = self.problem
+        if part < count:  # the end of what is swept is not the end of the path
+            problem = problem._replace(end_fraction=0.0)
         first, new, size = propose(
             best.poses[:part],
             best.curvatures[:part],

@@ -48,7 +48,9 @@ def propose(
         _displace_end(path[count - 1], shift, draws, normals, problem, target)
         size = copy_start(path, curvatures, first, out, out_curvatures)
         added = lay_dubins(path[first], target, limits, out[size:], out_curvatures[size:])
-        return (first, 0, 0) if added < 1 else (first, size + added, size + added)
+        if added < 1:
+            return first, 0, 0
+        return first, size + added, size + added
     first = int(draws[1] * (count - span))
     last = min(first + span, count - 1)
     size = copy_start(path, curvatures, first, out, out_curvatures)

@@ -44,8 +44,10 @@ def plan_call(
         nodes = nodes + beam.nodes
         if status is not PlanStatus.GOAL_UNREACHABLE:
             break
+    if status is PlanStatus.TIMED_OUT:
+        status = call.stopped_status  # it may have been cancelled
     return call.result(
-        call.stopped_status if status is PlanStatus.TIMED_OUT else status,
+        status,
         search.plan(),
         search.first - call.began,
         iterations,
@@ -75,19 +77,26 @@ class PredictiveCall:
             self._consider(beam.root())
             return PlanStatus.SOLVED
         turn = tight_turn(view)
-        root: BeamNode[Any] | None = beam.root()
-        if not in_table(view.start[2]):
-            root = None if turn is None else beam.follow(beam.root(), turned_start(turn))
+        root: BeamNode[Any] | None = None
+        if in_table(view.start[2]):
+            root = beam.root()
+        elif turn is not None:
+            root = beam.follow(beam.root(), turned_start(turn))
         if root is not None:
             self._consider(beam.finish(root))
         if self._best is None and turn is not None and not beam.stopped:
             ahead = beam.follow(beam.root(), turn)  # out of where the costs to go hold
-            self._consider(None if ahead is None else beam.finish(ahead))
+            if ahead is not None:
+                self._consider(beam.finish(ahead))
         if root is not None:
             self._widen(root)
+        if self._best is None and beam.stopped:
+            return PlanStatus.TIMED_OUT
         if self._best is None:
-            return PlanStatus.TIMED_OUT if beam.stopped else PlanStatus.GOAL_UNREACHABLE
-        return PlanStatus.SOLVED if view.channel.goal == view.away else PlanStatus.APPROXIMATE
+            return PlanStatus.GOAL_UNREACHABLE
+        if view.channel.goal < view.away:
+            return PlanStatus.APPROXIMATE
+        return PlanStatus.SOLVED
 
     def _widen(self, root: BeamNode[Any]) -> None:
         beam = self.beam
