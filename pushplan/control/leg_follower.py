@@ -20,7 +20,11 @@ _BESIDE = 0.03
 """Distances at which a point that lies behind, or abeam, counts as reached [circumscribed radii]:
 to turn for so little could sweep into something."""
 _NEAR = 0.02  # distance at which a point is reached by default [circumscribed radii]
-_SURE = 8.0  # distance from which on the bearing of a point is steered by [`near`]
+_STEERED_FROM = 8.0  # distance from which on the bearing of a point is steered by [`near`]
+_PROGRESS = 0.01  # by which a robot that gets on comes nearer to a point [circumscribed radii]
+_TURNS_IN = 0.8
+"""A robot whose middle is this near to a wall makes room by the rest of its circumscribed radius
+before it turns [inscribed radii]."""
 LITTLE_TURN = 0.6
 """A turn by less is not made the longer way [rad]."""
 _PATIENCE = 2.0
@@ -100,7 +104,7 @@ class LegFollower:
         self._response = number("response", response, low=0.0, open_low=True)
         self._escapes = escapes
         self._stall = StallChecker(robot)
-        self._progress = ProgressChecker(decrease_by(0.01 * size), _PATIENCE)
+        self._progress = ProgressChecker(decrease_by(_PROGRESS * size), _PATIENCE)
         self._aiming = ProgressChecker(decrease_by(0.5 * self._aligned), _PATIENCE)
         self._next = 0
         self._away: list[tuple[float, float]] = []
@@ -210,7 +214,7 @@ class LegFollower:
         speed = min(fastest, distance / seconds)
         self.steady = distance / fastest if abs(bearing) < 1e-6 else 0.0
         # near the point its bearing says little
-        turn = min(1.0, distance / (_SURE * self._near)) * bearing / seconds
+        turn = min(1.0, distance / (_STEERED_FROM * self._near)) * bearing / seconds
         return clamp_twist(robot, sign * speed, turn)
 
     def _make_room(self, pose: FloatArray, time: float, held: float, stopped: bool) -> Twist | None:
@@ -221,7 +225,7 @@ class LegFollower:
             self._room_from = pose
         elif stopped and self._turning and self._escapes and not self._away:
             self._escapes -= 1
-            room = robot.circumscribed_radius - 0.8 * robot.inscribed_radius
+            room = robot.circumscribed_radius - _TURNS_IN * robot.inscribed_radius
             self._away = [(robot.min_speed, room)] if robot.min_speed < 0.0 else []
             self._away += [(robot.max_speed, room)]
             self._room_from = pose

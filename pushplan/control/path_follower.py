@@ -11,6 +11,11 @@ from pushplan.control.tracking import Progress
 from pushplan.world import Drive, Plan, RobotModel, Twist, World
 from pushplan.world.checks import number
 
+_LEAST_SCALE = 0.2
+"""Bound of 1 - κ d, which is 0 in the middle of the path's own arc."""
+_MOST_ASKED = 0.6
+"""Sine of the angle to the path, at most, that an offset asks for."""
+
 
 @dataclass
 class PathFollower(StagedController):
@@ -59,9 +64,10 @@ class PathFollower(StagedController):
         offset = math.cos(path_theta) * (y - path_y) - math.sin(path_theta) * (x - path_x)
         error = (theta - path_theta + math.pi) % (2.0 * math.pi) - math.pi
         length = self.distance * size
-        own = curvature * math.cos(error) / max(1.0 - curvature * offset, 0.2)
+        own = curvature * math.cos(error) / max(1.0 - curvature * offset, _LEAST_SCALE)
         # a large offset asks for a heading across the path, not for ever sharper turns
-        left = math.sin(error) + max(min(0.5 * offset / length, 0.6), -0.6)
+        asked = max(min(0.5 * offset / length, _MOST_ASKED), -_MOST_ASKED)
+        left = math.sin(error) + asked
         wanted = own - 2.0 * left / length
         if abs(error) > math.pi / 2:
             left = error

@@ -11,6 +11,8 @@ from pushplan.world.checks import FloatArray
 
 _PATIENCE = 3.0
 """Time that may pass without getting on, in times that a step takes at full speed."""
+_PROGRESS = 0.01  # by which a robot that gets on comes nearer to a pose [circumscribed radii]
+_REACHED = 0.3  # of a step may be left when the next one begins, so that it does not slow down
 
 
 class PoseFollower:
@@ -60,8 +62,9 @@ class PoseFollower:
             if self._progress is None:
                 lasts = abs(moves) / robot.max_speed + turns / robot.max_turn_rate
                 patience = _PATIENCE * max(lasts, 2.0 * seconds)
-                self._progress = ProgressChecker(decrease_by(0.01 * size), patience)
-            if off < 0.3 * (abs(moves) + size * turns) or not self._progress.update(off, time):
+                self._progress = ProgressChecker(decrease_by(_PROGRESS * size), patience)
+            reached = off < _REACHED * (abs(moves) + size * turns)
+            if reached or not self._progress.update(off, time):
                 self._next += 1
                 self._progress = None
                 continue

@@ -10,9 +10,9 @@ from typing import Generic, TypeVar
 from pushplan.world import RobotModel, Twist
 from pushplan.world.checks import FloatArray
 
-_FRACTION = 0.1
+_STALL_FRACTION = 0.1
 """A robot that moves less than this fraction of what it was told to is being stopped."""
-_LEAST = 0.1
+_LEAST_TOLD = 0.1
 """Commanded motion below which nothing is concluded [circumscribed radii]."""
 _MOVED = 0.25  # that counts as getting on [circumscribed radii], or [rad]
 _TURN = 0.5  # for which a robot that gets on is given time [rad]
@@ -114,11 +114,13 @@ class StallChecker:
         away = pose - self._from
         turn = math.remainder(float(away[2]), math.tau)
         moved = self._path(math.hypot(float(away[0]), float(away[1])), turn)
-        if moved >= max(_FRACTION * self._told, _FRACTION * _LEAST * self._size):
-            if self._told >= _LEAST * self._size:
+        if moved >= max(_STALL_FRACTION * self._told, _STALL_FRACTION * _LEAST_TOLD * self._size):
+            if self._told >= _LEAST_TOLD * self._size:
                 self._begin(pose, time)
             return False
-        return self._told >= _LEAST * self._size and time - self._since >= self._patience - 1e-9
+        return (
+            self._told >= _LEAST_TOLD * self._size and time - self._since >= self._patience - 1e-9
+        )
 
     def send(self, command: Twist) -> None:
         """Take the command that is driven until the next call of `update`."""

@@ -33,6 +33,10 @@ from pushplan.world.checked_fields import (
 from pushplan.world.checks import FloatArray, IntArray
 from pushplan.world.outline import flatten, outline_boxes, unflatten
 
+_TOLERANCE = 1e-3  # overlap that counts as resolved [sizes of the thinnest body]
+_MOST_SLENDER = 30.0
+"""A body that is thinner than the robot by more sets no finer steps, which would take forever."""
+
 
 class QuasiStaticContacts(NamedTuple):
     """`QuasiStatic` in compiled form, with memory for one thread."""
@@ -101,7 +105,7 @@ class QuasiStatic(CheckedFields):
         size = _thinnest(world.robot, _Shapes(world.movables))
         return Settings(
             max_step=self.step * size,
-            tolerance=1e-3 * size,
+            tolerance=_TOLERANCE * size,
             jam_depth=0.25 * self.step * size,
             iterations=self.iterations,
             friction=float(self.friction),
@@ -154,7 +158,7 @@ def _thinnest(robot: RobotModel, shapes: _Shapes) -> float:
     """Half diagonal of the square that is as wide as the thinnest body [m]."""
     movables = shapes.movables
     outlines = [*robot.wall_parts, *unflatten(movables.vertices, movables.offsets)]
-    floor = robot.circumscribed_radius / 30.0
+    floor = robot.circumscribed_radius / _MOST_SLENDER
     sizes = {len(outline) for outline in outlines}  # those with as many corners at once
     widths = [_width(np.stack([o for o in outlines if len(o) == size])) for size in sizes]
     return max(min(widths) / math.sqrt(2.0), floor)

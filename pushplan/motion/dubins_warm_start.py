@@ -23,6 +23,9 @@ _FAR = 30.0
 """Edges of a tree in a straight line to the goal beyond which it is far."""
 _SHARP = 0.8
 """Turn beyond which a bend is driven through its ends, not only through its middle [rad]."""
+_WIDE = 1.25  # clearance of the first path [circumscribed radii]
+_BEYOND_RADIUS = 1.02  # the same at least, so that curves around corners fit [turning radii]
+_NARROW = 1.1  # clearance of the second path, where the first leads nowhere [circumscribed radii]
 
 
 def is_far(improver: PathImprover) -> bool:
@@ -39,7 +42,8 @@ def warm_start(improver: PathImprover) -> None:
     if isinstance(improver.goal, GoalDisc):
         depth = improver.goal.radius - 0.99 * float(problem.goal[3])
     radius = problem.turning_radius
-    for clearance in (max(1.25 * size, 1.02 * radius), 1.1 * size):
+    wide = max(_WIDE * size, _BEYOND_RADIUS * radius)
+    for clearance in (wide, _NARROW * size):
         if improver.stopped():
             return  # the contours alone take their time on a large map
         world = improver.world.moved(robot_pose=improver.lead.pose)

@@ -35,6 +35,9 @@ from pushplan.world.planning_call import PlanningCall
 _THIN_MARGIN = 0.05
 """Margin below which a post could hide between two poses of the usual spacing [R]."""
 _LEAST_SPACING = 0.02  # least spacing for that reason [R]
+_LESS_MARGIN = 0.4  # of the margin is kept where plans fail with it
+_NO_MARGIN = 0.01  # a margin as small is given up then [R]
+_BEYOND = 1e4  # times the way around the workspace with everything in tow: no path is as long
 ENDLESS = 2**62
 """A limit of the tests of a sweep that is none."""
 
@@ -134,8 +137,8 @@ class PathImprover:
         if self.relaxed < 2:
             return
         if self.relaxed >= 4:
-            margin = 0.4 * self._margin
-            if self._margin <= 0.01 * self.size:
+            margin = _LESS_MARGIN * self._margin
+            if self._margin <= _NO_MARGIN * self.size:
                 margin = 0.0
             self._set_margin(margin)
         radius = self.world.robot.turning_radius
@@ -158,7 +161,7 @@ class PathImprover:
         world = self.world
         extent = float((world.static.bounds[2:] - world.static.bounds[:2]).sum())
         load = self.config.push_weight * float(world.movables.masses.sum()) / world.robot.mass
-        return 1e4 * (extent + self.size) * (1.0 + load)
+        return _BEYOND * (extent + self.size) * (1.0 + load)
 
     @property
     def room(self) -> Room:

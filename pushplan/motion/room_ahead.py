@@ -23,8 +23,8 @@ _LEAST_TURN = 0.02  # the same of headings at least [rad]
 _REACH = 3.0  # distance at which the robot has got away [circumscribed radii]
 _FAR = 12.0  # the same where it looks for a place to turn about [circumscribed radii]
 _SPACIOUS = 1.3  # clearance that it turns about with at best: curves lead on from there [R]
-_MOST = 5_000  # poses that are looked at, ahead; then it counts as getting away
-_MOST_OF_ALL = 60_000  # the same where the robot may do all that it can
+_MOST_POSES_AHEAD = 5_000  # poses that are looked at, ahead; then it counts as getting away
+_MOST_POSES = 60_000  # the same where the robot may do all that it can
 _PIECE = 250  # poses between two looks at the stop rule: about a millisecond
 _FINER = 0.25  # steps of the second look, before a robot is said to be boxed in
 _CLOSED = -1
@@ -135,7 +135,7 @@ def gets_away(room: Room, start: FloatArray, size: float, radius: float) -> bool
         radius: its least turning radius [m].
     """
     rules = _Rules(_arcs(_STEP * size, radius), _REACH * size, 0.0, False)
-    return _search(room, rules, start, _MOST, never)[0] != _CLOSED
+    return _search(room, rules, start, _MOST_POSES_AHEAD, never)[0] != _CLOSED
 
 
 def is_boxed_in(
@@ -154,7 +154,7 @@ def is_boxed_in(
     for step in (_STEP, _FINER * _STEP):
         moves = _moves(robot, step, radius)
         rules = _Rules(moves, _REACH * size, 0.0, False)
-        if _search(room, rules, start, _MOST_OF_ALL, stopped)[0] != _CLOSED:
+        if _search(room, rules, start, _MOST_POSES, stopped)[0] != _CLOSED:
             return False
     return True
 
@@ -178,7 +178,7 @@ def way_to_turn(
     if can_turn(start, swept, room.walls):
         return None
     moves = _moves(robot, _STEP, size)
-    for clearance, most in ((_SPACIOUS * swept, _MOST), (swept, _MOST_OF_ALL)):
+    for clearance, most in ((_SPACIOUS * swept, _MOST_POSES_AHEAD), (swept, _MOST_POSES)):
         rules = _Rules(moves, _FAR * size, clearance, True)
         at, found = _search(room, rules, start, most, stopped)
         if at > 0:

@@ -19,6 +19,8 @@ TIGHTEST = 0.1
 
 _WIDEST = 1e5
 """Greatest turning radius of vehicles that lattices are made for, in circumscribed radii."""
+_FRACTIONS = (1.0, 0.5, 0.25, 0.1, 0.0)
+"""Fractions of the margin that are tried in turn where a robot starts near a wall."""
 
 
 def turning_radius(robot: RobotModel, turn_fraction: float) -> float:
@@ -53,7 +55,7 @@ def start_margin(world: World, margin: float) -> float | None:
     A robot that starts nearer to a wall than ``margin`` keeps what it has.
     """
     walls = obstacles(keep_out(world))
-    for fraction in (1.0, 0.5, 0.25, 0.1, 0.0):
+    for fraction in _FRACTIONS:
         shape = footprint(world.robot, fraction * margin)
         if is_free(owned(world.robot_pose), shape, walls, np.empty_like(shape.vertices)):
             return fraction * margin

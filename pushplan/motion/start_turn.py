@@ -23,6 +23,9 @@ from pushplan.world.polyline import arc_lengths
 
 _LEAST = 0.1
 """A turn that brings the heading nearer by less is not worth while [rad]."""
+_CLEARANCE = 1.1
+"""Clearance of the path whose bearing is turned to [circumscribed radii]; where there is none with
+it, the inscribed radius."""
 
 
 def start_turn(improver: PathImprover, before: Lead | None = None) -> Lead | None:
@@ -93,7 +96,7 @@ def drive_to_turn(improver: PathImprover) -> Lead | None:
 def _first_heading(improver: PathImprover, start: FloatArray) -> float | None:
     """The bearing [rad] of the shortest path around the walls where it is R away; None without."""
     static = keep_out(improver.world)
-    for clearance in (1.1 * improver.size, improver.world.robot.inscribed_radius):
+    for clearance in (_CLEARANCE * improver.size, improver.world.robot.inscribed_radius):
         graph = VisibilityGraph(static, clearance)
         corners = graph.to_goal(start, improver.goal, improver.stopped).points
         if len(corners):

@@ -29,6 +29,7 @@ from pushplan.world.polyline import path_length, path_lengths
 
 _MOST_OBJECTS = 40  # among more, no keyholes are looked for
 _MOST_CELLS = 400_000  # of the configuration space
+_SAME_HEADING = 0.3  # scenes whose objects differ by less count as one [rad]
 _LEAVING = 2.5  # length of a straight drive to where its disc is free [circumscribed radii]
 
 
@@ -193,7 +194,7 @@ class KeyholeSearch:
         state = end.state
         cell = 2.0 * self._space.cell
         label = np.flatnonzero(state.reached.ravel())[:1]
-        key = np.rint(state.poses / (cell, cell, 0.3)).tobytes() + label.tobytes()
+        key = np.rint(state.poses / (cell, cell, _SAME_HEADING)).tobytes() + label.tobytes()
         if key in self._seen:
             return
         self._seen.add(key)

@@ -8,6 +8,9 @@ import numpy as np
 
 from pushplan.world.checks import FloatArray
 
+_BLOCK = 128  # targets that are drawn at once, as a draw of few takes as long
+_HEADING_SPREAD = 0.4  # standard deviation of headings about the coarse path [rad]
+
 
 @dataclass(eq=False)
 class Targets:
@@ -31,7 +34,7 @@ class Targets:
     def __call__(self) -> FloatArray:
         """The next target (3,)."""
         if self.used == len(self.block):
-            self.block = self._draw(128)
+            self.block = self._draw(_BLOCK)
             self.used = 0
         self.used += 1
         target: FloatArray = self.block[self.used - 1]
@@ -42,7 +45,7 @@ class Targets:
         bounds = self.bounds
         near = rng.random(count) < self.fraction
         index = rng.integers(len(self.coarse), size=count)
-        offsets = rng.standard_normal((count, 3)) * [self.spread, self.spread, 0.4]
+        offsets = rng.standard_normal((count, 3)) * [self.spread, self.spread, _HEADING_SPREAD]
         coarsed = np.column_stack([self.coarse[index], self.headings[index]]) + offsets
         spread = rng.random((count, 3))
         low = [*bounds[:2], -np.pi]

@@ -50,6 +50,10 @@ _MOST_NODES = 3_000_000
 _MOST_CELLS = 1_000_000
 _FEW_COLUMNS = 256  # of the map, between two looks at a stop rule
 _STEP = 0.5  # of the lattice, about [B]; the turning radius is a whole number of steps
+_THINNEST = 0.1  # breadth that a thin robot counts as [circumscribed radii]
+_RATIOS = (2, 40)  # fewest and most steps in a turning radius
+_ASIDE = 0.3  # breadth of a clipped lattice, to each side [lengths of the straight line]
+_LEAST_ASIDE = 20  # the same at least [steps]
 _CELLS_PER_STEP = 4  # of the cost map; fewer where the map would be too large
 
 
@@ -70,8 +74,9 @@ class LatticeBuilder:
         radius = self.radius
         robot = self.world.robot
         # the radius is a whole number of steps, so that few sets of primitives are ever needed
-        wanted = _STEP * 2.0 * max(robot.inscribed_radius, 0.1 * robot.circumscribed_radius)
-        ratio = float(min(max(round(radius / wanted), 2), 40))
+        width = 2.0 * max(robot.inscribed_radius, _THINNEST * robot.circumscribed_radius)
+        least, most = _RATIOS
+        ratio = float(min(max(round(radius / (_STEP * width)), least), most))
         self.step = radius / ratio
         goal = world.goal
         if isinstance(goal, GoalDisc):  # longer steps, so that the middle of a disc is a place
@@ -109,7 +114,7 @@ class LatticeBuilder:
         size = (reach[0] + reach[1]) * (reach[2] + reach[3]) * self.config.headings
         self.clipped = size > _MOST_NODES
         if self.clipped:  # a small robot in a large hall: look only near the straight line
-            aside = max(math.ceil(0.3 * self.ahead), 20)
+            aside = max(math.ceil(_ASIDE * self.ahead), _LEAST_ASIDE)
             most = (aside, math.ceil(self.ahead) + aside, aside, aside)
             reach = [min(pair) for pair in zip(reach, most, strict=True)]
         self.rows = reach[0] + reach[1] + 1

@@ -9,7 +9,7 @@ from pushplan.world import Drive, RobotModel, Twist, World
 
 _DISTANCE = 1.0  # by which a recovery takes the robot away [circumscribed radii]
 _PLACE = 2.0  # recoveries that are no farther apart are at the same place [circumscribed radii]
-_MOST = 6  # recoveries at one place
+_MOST_RECOVERIES = 6  # recoveries at one place
 _HERE = 0.5  # size of a place where calls find nothing [circumscribed radii]
 _MOST_DOUBLINGS = 5
 
@@ -46,7 +46,7 @@ class RecoveryRule:
     @property
     def stuck(self) -> bool:
         """True if all recoveries at this place are used up."""
-        return self._count >= _MOST
+        return self._count >= _MOST_RECOVERIES
 
     @property
     def is_on(self) -> bool:
