@@ -114,13 +114,12 @@ class StallChecker:
         away = pose - self._from
         turn = math.remainder(float(away[2]), math.tau)
         moved = self._path(math.hypot(float(away[0]), float(away[1])), turn)
+        told_enough = self._told >= _LEAST_TOLD * self._size
         if moved >= max(_STALL_FRACTION * self._told, _STALL_FRACTION * _LEAST_TOLD * self._size):
-            if self._told >= _LEAST_TOLD * self._size:
+            if told_enough:
                 self._begin(pose, time)
             return False
-        return (
-            self._told >= _LEAST_TOLD * self._size and time - self._since >= self._patience - 1e-9
-        )
+        return told_enough and time - self._since >= self._patience - 1e-9
 
     def send(self, command: Twist) -> None:
         """Take the command that is driven until the next call of `update`."""
