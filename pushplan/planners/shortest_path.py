@@ -1,4 +1,4 @@
-"""`ShortestPath`: as straight as the walls allow, through whatever is in the way. The floor."""
+"""`ShortestPath`: the shortest path around the walls, through all objects. The lower reference."""
 
 from __future__ import annotations
 

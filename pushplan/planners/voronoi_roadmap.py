@@ -1,4 +1,4 @@
-"""`Skeleton`: along the middle of the open water between the objects. A floor for ships."""
+"""`Skeleton`: along the middle of the open water between objects. A reference for ships."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Skeleton:
     Args:
         spacing: distance between points on outlines, and between poses of the plan [R]; points
             are farther apart where there are many outlines.
-        narrow: price of a metre where there is no water at all, beside the metre itself.
+        narrow: cost of a metre where there is no water at all, beside the metre itself.
     """
 
     spacing: float = 0.25
@@ -179,12 +179,12 @@ class Skeleton:
         lengths = np.hypot(*(corners[a] - corners[b]).T)
         missing = np.maximum(1.0 - np.minimum(room[a], room[b]) / half, 0.0)
         costs = lengths * (1.0 + self.narrow * missing)
-        ways = nx.Graph()
-        ways.add_weighted_edges_from(zip(a.tolist(), b.tolist(), costs.tolist(), strict=True))
+        roadmap = nx.Graph()
+        roadmap.add_weighted_edges_from(zip(a.tolist(), b.tolist(), costs.tolist(), strict=True))
         go_on(stopped)
-        if start not in ways:
+        if start not in roadmap:
             return None
-        before, lengths_to = nx.dijkstra_predecessor_and_distance(ways, start)
+        before, lengths_to = nx.dijkstra_predecessor_and_distance(roadmap, start)
         go_on(stopped)
         # the last stretch is straight ahead to the goal, and a little into it
         nodes = np.array(list(lengths_to))

@@ -110,16 +110,16 @@ class GoalCost:
 
 @dataclass(frozen=True, eq=False)
 class ObjectCost:
-    """Cost-to-go of the objects: their ways to where they are done, and a price of each undone one.
+    """Cost-to-go of the objects: their ways to where they are done, and a cost of each undone one.
 
-    Without that price a robot that has just finished an object would be worse off, as the next one
+    Without that cost a robot that has just finished an object would be worse off, as the next one
     is far away.
 
     Args:
         field: of the way of an object's middle.
         weights: (K,) cost of a metre of it [kg].
         done: (K,) way up to which an object is done [m].
-        undone: price of each object that is not [kg m].
+        undone: cost of each object that is not [kg m].
     """
 
     field: Field

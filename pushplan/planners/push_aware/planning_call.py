@@ -25,7 +25,8 @@ from pushplan.world import PlanStatus
 from pushplan.world.checks import FloatArray
 
 _FIRST_SEARCH = 1000.0
-"""Arcs driven in a search at most; a quarter more after each that took them all."""
+"""Arcs driven in a search at most; more after each that took them all."""
+_PATIENCE_GROWTH = 1.25  # factor on it then
 _COST_SIGMA = 0.7
 """Perturbation of objects' costs from one search to the next: deviation of their logarithm."""
 
@@ -35,8 +36,12 @@ _NODES = 100_000  # nodes of one search at most
 _MEMORY = 48.0  # of the objects' poses in one search at most [MiB]
 _EXPANSIONS = 30
 """Half the arcs driven at most between two looks at the stop rule, fewer among many objects."""
+_HOPEFUL_GAINS = 5.0
+"""Rounds of shortcuts, each with the last one's gain, in which a path may still become the best."""
 _SLACK = 0.05
 """Fraction by which a path of the search may cost more than the best plan before it is shortcut."""
+_UNSOLVED_RATIO = 1.3  # cost of a plan over that of its path without objects, where none is known
+_MOST_RATIO = 2.0  # the same at most: more inflation would make searches greedy
 _RANDOM_NODES = 20_000  # nodes of a random tree at most; then another is begun
 _SIGNATURES = 4  # ways to have pushed the objects that some searches tell apart in each cell
 _LONGEST_ARC = 2.0  # longest arc of the random tree [R]
@@ -128,7 +133,7 @@ class PushAwareSearch:
             warm_start(improver)
             table = self._table()
             if table is not None:
-                self._search(table, replace(self._first_variant(table), inflation=1.3))
+                self._search(table, replace(self._first_variant(table), inflation=_UNSOLVED_RATIO))
         return None
 
     def _turn_first(self, table: CostToGo | None) -> None:
@@ -184,8 +189,8 @@ class PushAwareSearch:
         x, y, theta = (float(value) for value in self.world.robot_pose)
         alone = self.world.robot.mass * float(length_to_go(table, x, y, theta))
         if not self.improver.solved or not 0.0 < alone < np.inf:
-            return 1.3
-        return min(max(self.improver.best_cost / alone, 1.0), 2.0)
+            return _UNSOLVED_RATIO
+        return min(max(self.improver.best_cost / alone, 1.0), _MOST_RATIO)
 
     def _memory(self, table: CostToGo, signatures: int) -> PushTree:
         """Memory for one search; kept for the next where it fits."""
@@ -215,9 +220,9 @@ class PushAwareSearch:
         while not improver.stopped():
             before = int(nodes.counts[3])
             if before >= self._patience:
-                self._patience *= 1.25  # the trees may know better; then this takes longer
+                self._patience *= _PATIENCE_GROWTH  # the trees may know better meanwhile
                 return
-            outcome = star.run(2 * self._few())
+            outcome = star.run(2 * self._batch())
             driven = int(nodes.counts[3]) - before
             improver.iterations += max(1, driven)
             self.expansions += driven
@@ -231,7 +236,7 @@ class PushAwareSearch:
         """Add arcs to the random tree, and shortcut what gets to the goal with it."""
         improver = self.improver
         world = self.world
-        few = self._few()
+        batch = self._batch()
         if self._tree is None:
             self._tree = make_push_tree(_RANDOM_NODES, len(world.movables), _MEMORY)
             self._plant(self._tree)
@@ -241,11 +246,11 @@ class PushAwareSearch:
             bound = improver.plan_cost
             if not np.isfinite(bound):
                 return
-            draws = self.rng.random((few, DRAWS))
+            draws = self.rng.random((batch, DRAWS))
             longest = _LONGEST_ARC * self.size
             node = grow(self._tree, draws, bound, longest, scales, improver.problem)
-            improver.iterations += few
-            self.random_arcs += few
+            improver.iterations += batch
+            self.random_arcs += batch
             if node >= 0:
                 self._try(trace(self._tree, node))
             if node == -2:
@@ -255,7 +260,7 @@ class PushAwareSearch:
         """Begin a search where the robot and the objects are."""
         plant(tree, self.improver.lead.pose, self.improver.lead.objects, 0.0)
 
-    def _few(self) -> int:
+    def _batch(self) -> int:
         """Arcs to drive between two looks at the stop rule."""
         return max(1, 10 * _EXPANSIONS // (10 + len(self.world.movables)))
 
@@ -281,5 +286,5 @@ class PushAwareSearch:
             improver.shortcut(candidate)
             gain = before - candidate.cost
             behind = candidate.cost - improver.best_cost
-            if gain <= LEAST_GAIN * before or behind > 5.0 * gain:
+            if gain <= LEAST_GAIN * before or behind > _HOPEFUL_GAINS * gain:
                 return

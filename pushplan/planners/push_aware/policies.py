@@ -26,7 +26,7 @@ def push_aware(
 def push_aware_constant_speed(
     planner: Planner | None = None, stop: Stop | None = None, friction: float = 0.1
 ) -> PlanFollower:
-    """`push_aware` with the turn rate alone, as the paper's policies drive; see there."""
+    """Push-aware search at constant speed, turn rate only, as in the paper; see `push_aware`."""
     model = cautious_model(friction)
     return PlanFollower(
         planner or PushAware(interaction=model), PathFollower(), interaction=model, stop=stop

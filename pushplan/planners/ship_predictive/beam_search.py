@@ -19,6 +19,10 @@ from pushplan.world.polyline import step_lengths
 
 SPACING = 0.05
 """Between the poses of a path, in hull lengths."""
+_CELL = 0.08
+"""Side of a cell in which paths end at the same place [hull lengths]."""
+_HEADING_CELL = 0.2
+"""Difference of headings up to which they are the same [rad]."""
 _TRIES = 2.5
 """Pieces predicted exactly for each path kept; the others are left out by their estimate."""
 
@@ -140,14 +144,14 @@ class BeamSearch(Generic[Ice]):
     def _thinned(self, layer: list[BeamNode[Ice]], width: int) -> list[BeamNode[Ice]]:
         """The best of a layer, one for each place and heading."""
         layer.sort(key=lambda node: node.total)
-        cell = 0.08 * self.view.length
+        cell = _CELL * self.view.length
         kept = []
         seen = set()
         for node in layer:
             place = (
                 round(node.pose[0] / cell),
                 round(node.pose[1] / cell),
-                round(node.pose[2] / 0.2),
+                round(node.pose[2] / _HEADING_CELL),
             )
             if place not in seen:
                 seen.add(place)

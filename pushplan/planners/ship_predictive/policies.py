@@ -25,7 +25,7 @@ def network(planner: Planner | None = None, stop: Stop | None = None) -> PlanFol
 
 
 def published(planner: Planner | None = None, stop: Stop | None = None) -> PlanFollower:
-    """The published search by a network: a new plan every 5 m with a ship of 2 m, and taken."""
+    """The published network-based search: replans every 5 hull radii and takes the new plan."""
     rule = Replanning(margin=None, renewal=5.0)
     return _renewed(planner or PredictivePublished(), rule, stop)
 
