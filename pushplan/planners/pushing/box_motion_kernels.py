@@ -12,10 +12,10 @@ from pushplan.compiled import copy_into, kernel
 from pushplan.geometry.angles import wrap_angle
 from pushplan.planners.pushing.contact_kernels import (
     Contact,
+    contact_velocity,
     flush_angle,
     standoff,
     standoff_turned,
-    velocity_turned,
 )
 from pushplan.world.checks import FloatArray
 
@@ -69,7 +69,7 @@ def _push(
     out: FloatArray,
 ) -> None:
     """One substep of a box that touches the bumper at an angle of known cosine and sine."""
-    uy = w * velocity_turned(contact, state[3], state[4], c, s, v, w, dt, out)
+    uy = w * contact_velocity(contact, state[3], state[4], c, s, v, w, dt, out)
     before = state[4] - flush_angle(contact, state[3])
     state[3] += dt * (out[0] * s + out[1] * c - uy)
     state[4] += dt * (out[2] - w)

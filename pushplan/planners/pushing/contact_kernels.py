@@ -126,28 +126,18 @@ def contact_velocity(
     contact: Contact,
     offset: float,  # of the box's centre to the left of the robot's x axis [m]
     angle: float,  # of the face's normal against the robot's heading [rad]
-    v: float,
-    w: float,
-    dt: float,  # step in which an open line of contact should close [s]
-    out: FloatArray,  # (6,) of a box that touches the bumper
-) -> None:
-    """Fill v_n, v_t [m/s], ω [rad/s], pressure centre [m], mode, shear over normal force."""
-    velocity_turned(contact, offset, angle, np.cos(angle), np.sin(angle), v, w, dt, out)
-
-
-@kernel
-def velocity_turned(
-    contact: Contact,
-    offset: float,
-    angle: float,
     c: float,  # cosine and sine of the angle
     s: float,
     v: float,
     w: float,
-    dt: float,
-    out: FloatArray,
+    dt: float,  # step in which an open line of contact should close [s]
+    out: FloatArray,  # (6,) of a box that touches the bumper
 ) -> float:
-    """`contact_velocity` of an angle whose cosine and sine are known; x of the box's centre [m]."""
+    """Fill v_n, v_t [m/s], ω [rad/s], pressure centre [m], mode, shear over normal force.
+
+    Returns:
+        The x of the box's centre [m].
+    """
     x, touch = standoff_turned(contact, offset, c, s)
     ux = v - w * offset
     uy = w * x

@@ -22,7 +22,7 @@ from pushplan.world.checks import choice, integer, number
 from pushplan.world.outline import centroid, convex_outline
 
 SUPPORTS = ("uniform", "inertia", "corners")
-"""PathsFromStart in which a box may press on the ground, see `pressure_radius`."""
+"""Supports by which a box may press on the ground, see `pressure_radius`."""
 _RINGS = 64
 
 

@@ -25,8 +25,8 @@ class PushPath(ArrayRecord):
     """The path of a box's centre.
 
     Args:
-        poses: (N, 3) x, y [m] and direction of travel [rad], at least two; what way round the box
-            itself is does not matter.
+        poses: (N, 3) x, y [m] and direction of travel [rad], at least two; how the box itself is
+            turned does not matter.
 
     Raises:
         InvalidInputError: if there are fewer than two poses, or the path has no length.

@@ -35,19 +35,19 @@ from pushplan.planners.pushing.push_observer_kernels import (
 )
 from pushplan.world.checks import FloatArray
 
-_BACK = 0.5
-_WINDOW = 2.0
+_SEARCH_BACK = 0.5
+_SEARCH_AHEAD = 2.0
 """Greatest move of the box's place, back or ahead, from one call to the next [L]."""
-_LEAST = 0.4
+_LEAST_SPEED = 0.4
 """Least speed of a push that has not ended, as a fraction of the greatest, or of that at which the
 robot can turn within the distance to the box."""
-_LOOK = 4.0
+_CLEAR_PERIODS = 4.0
 """Periods for which a command must stay clear of static things, or it is driven more slowly."""
-_BESIDE = 1.5
-_AHEAD = 2.0
+_MOST_OFFSET = 1.5
+_MOST_GAP = 2.0
 """Greatest offset [half bumpers] and gap [L] that the problem is solved for."""
-_BLOCKED = 0.5
-_ASIDES = 6
+_LEAST_FRACTION = 0.5
+_TURNS_TRIED = 6
 """Fraction of a command below which others are tried, and how many."""
 
 
@@ -72,8 +72,8 @@ def observe_push(
     contact = contact_now(memory)
     size = contact.front + contact.depth
     box_pose(contact, memory.guess, at)
-    low = max(told[ALONG] - _BACK * size, 0.0)
-    along, index, _ = locate(track, at[0], at[1], low, told[ALONG] + _WINDOW * size)
+    low = max(told[ALONG] - _SEARCH_BACK * size, 0.0)
+    along, index, _ = locate(track, at[0], at[1], low, told[ALONG] + _SEARCH_AHEAD * size)
     told[ALONG] = min(along, track.lengths[-1])
     path = track.poses[min(index, track.poses.shape[0] - 1)]
     told[LATERAL] = (at[1] - path[1]) * np.cos(path[2]) - (at[0] - path[0]) * np.sin(path[2])
@@ -96,14 +96,14 @@ def problem_now(memory: PushingMemory, track: ReferencePath, held: float) -> Pus
     set_bounds(horizon, horizon.steps[0], horizon.steps[0])
     # a push goes forwards; where the robot cannot be that fast yet it gets there as it can
     reach = horizon.limits.max_acceleration / base.max_speed * horizon.steps[0]
-    least = _LEAST * min(1.0, horizon.limits.max_turn_rate * length / base.max_speed)
+    least = _LEAST_SPEED * min(1.0, horizon.limits.max_turn_rate * length / base.max_speed)
     for i in range(horizon.program.moves):
         horizon.program.low[i] = min(least, horizon.last[0] / base.max_speed + reach)
     near = memory.near
-    far = _BESIDE * contact.half
+    far = _MOST_OFFSET * contact.half
     copy_into(near, memory.guess)
     near[3] = min(max(near[3], -far), far)
-    near[5] = min(near[5], _AHEAD * length)
+    near[5] = min(near[5], _MOST_GAP * length)
     weights = Weights(
         length,
         base.max_speed,
@@ -197,15 +197,15 @@ def drive_push(
     start = memory.guess
     clearance = memory.clearance
     length = contact.front + contact.depth
-    look = max(_LOOK * held, 2.0 * abs(v) / horizon.limits.max_acceleration)
+    look = max(_CLEAR_PERIODS * held, 2.0 * abs(v) / horizon.limits.max_acceleration)
     free = free_fraction(contact, normal, start, v, w, look, clearance, obstacles)
-    if free < _BLOCKED:
+    if free < _LEAST_FRACTION:
         speed = max(abs(v), abs(w) * length)
-        for i in range(_ASIDES):
+        for i in range(_TURNS_TRIED):
             turn = (0.1, 0.3, 0.7)[i // 2]
             aside = w + (turn if i % 2 == 0 else -turn) * speed / length
             other = free_fraction(contact, normal, start, v, aside, look, clearance, obstacles)
-            if other > free + _BLOCKED * turn:
+            if other > free + _LEAST_FRACTION * turn:
                 free = other
                 w = aside
                 break

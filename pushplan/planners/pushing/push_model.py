@@ -22,7 +22,7 @@ from pushplan.world.checked_fields import CheckedFields, Shape
 from pushplan.world.checks import ArrayRecord, FloatArray, array, expect, number
 from pushplan.world.outline import centroid, convex_outline
 
-_BENT = 0.7  # greatest curvature times depth of a box: a box fits into the bumper's hollow
+_MOST_HOLLOW = 0.7  # greatest curvature times depth of a box: a box fits into the bumper's hollow
 
 
 @lru_cache(maxsize=256)
@@ -92,7 +92,7 @@ class PushModel:
         self.contact = Contact(
             self.bumper.front,
             self.bumper.half,
-            min(self.bumper.curvature, _BENT / self.face.depth),
+            min(self.bumper.curvature, _MOST_HOLLOW / self.face.depth),
             self.face.depth,
             self.face.low,
             self.face.high,

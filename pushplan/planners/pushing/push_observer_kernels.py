@@ -15,8 +15,8 @@ from pushplan.planners.pushing.contact_kernels import Contact
 from pushplan.planners.pushing.cost_kernels import Memory, Weights
 from pushplan.world.checks import FloatArray, IntArray
 
-_TURNED = np.pi * 50.0 / 180.0  # angle at which another face is taken to be the pushed one
-_JUMP = 0.35  # a pose farther than this from the predicted one replaces it [L]
+_FACE_TURNED = np.pi * 50.0 / 180.0  # angle at which another face is taken to be the pushed one
+_POSE_JUMP = 0.35  # a pose farther than this from the predicted one replaces it [L]
 ALONG, LATERAL, SLOWED, VALUE, SEEN_AT, OBSERVED = range(6)
 """Places in `PushingMemory.told`."""
 
@@ -65,7 +65,7 @@ def estimate(memory: PushingMemory, pose: FloatArray, box: FloatArray, time: flo
     faces = memory.faces
     contact = contact_now(memory)
     observe(contact, faces.normals[memory.face[0]], pose, box, memory.seen)
-    if abs(memory.seen[4]) > _TURNED:
+    if abs(memory.seen[4]) > _FACE_TURNED:
         take_face(memory, pose[2] - box[2])
         contact = contact_now(memory)
         observe(contact, faces.normals[memory.face[0]], pose, box, memory.seen)
@@ -112,7 +112,7 @@ def _correct(memory: PushingMemory, contact: Contact, size: float, time: float) 
         dx = seen[0] - guess[0]
         dy = seen[1] - guess[1]
         far = max(far, np.sqrt(dx * dx + dy * dy))
-        if far / size >= _JUMP or turned >= _JUMP:
+        if far / size >= _POSE_JUMP or turned >= _POSE_JUMP:
             copy_into(state, seen)
     else:
         copy_into(state, seen)

@@ -1,4 +1,4 @@
-"""The way to the start of a push: cheapest paths on a lattice, and legs and turns along one."""
+"""The route to the start of a push: cheapest paths on a lattice, and legs and turns along one."""
 
 from __future__ import annotations
 
@@ -27,12 +27,20 @@ from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.route_kernels import RouteProblem, cheapest_legs
 from pushplan.world.checks import FloatArray, IntArray
 
-_NONE = np.zeros(0, dtype=np.int64)
-_MOST = 14  # corners of the lattice's path that a route may have corners at
-_LONGEST = 6
+_NO_POSES = np.zeros(0, dtype=np.int64)
+_START_REACHES = (1.5, 4.0)
+"""Distances [cells] within which a search begins; the greater one if all near poses are blocked."""
+_ARRIVAL_REACHES = (1.3, 2.0)
+_ARRIVAL_BACK = 0.7
+"""Distances [cells] to the poses from which a start is reached, from a place behind it, so that the
+robot arrives ahead; the greater one from the start itself, where poses behind it are blocked."""
+_TURN_STEP = 0.3  # of the poses of a turn on the spot [rad]
+_MOST_CORNERS = 14  # corners of the lattice's path that a route may have corners at
+_LONGEST_LEG = 6
 """Points further on that a leg may end at, where the robot has to keep to the lattice's path."""
-_MORE = 1.5  # By this factor a route may cost more than the lattice's path, and a radius
-_AWAY = (0.3, -0.3, 0.6, -0.6, 1.0, -1.0)
+_MOST_DETOUR = 1.5
+"""Factor by which a route may cost more than the lattice's path, beside a radius."""
+_FIRST_LEGS = (0.3, -0.3, 0.6, -0.6, 1.0, -1.0)
 """Distances that the robot may drive ahead first, to get to where it can turn, and off an object
 that it has just pushed [circumscribed radii]."""
 
@@ -70,7 +78,7 @@ def search_approaches(
     contact_grid: ContactGrid,
     pose: FloatArray,
     weights: FloatArray,
-    until: IntArray = _NONE,
+    until: IntArray = _NO_POSES,
     target: int = -1,
 ) -> ApproachTree:
     """Cheapest paths on a lattice.
@@ -84,7 +92,7 @@ def search_approaches(
         target: see `ApproachTree`.
     """
     grid, layers = contact_grid
-    for reach in (1.5, 4.0):
+    for reach in _START_REACHES:
         starts, costs = near_poses(grid, np.array(pose), reach)
         if len(starts):
             break
@@ -99,7 +107,7 @@ def arrivals_at(grid: PoseGrid, pushes: Sequence[Push]) -> Arrivals:
     """The poses from which the starts of pushes are reached."""
     found = [arrival_poses(grid, push.start) for push in pushes]
     return Arrivals(
-        np.concatenate([nodes for nodes, _ in found] or [_NONE]),
+        np.concatenate([nodes for nodes, _ in found] or [_NO_POSES]),
         np.concatenate([extra for _, extra in found] or [np.zeros(0)]),
         np.cumsum([len(nodes) for nodes, _ in found], dtype=np.int64),
     )
@@ -108,9 +116,9 @@ def arrivals_at(grid: PoseGrid, pushes: Sequence[Push]) -> Arrivals:
 def arrival_poses(grid: PoseGrid, start: FloatArray) -> tuple[IntArray, FloatArray]:
     """Lattice poses from which the start of a push is reached, and the cost of the rest [m]."""
     u = np.array([np.cos(start[2]), np.sin(start[2]), 0.0])
-    nodes, extra = near_poses(grid, start - 0.7 * grid.step * u, 1.3)
+    nodes, extra = near_poses(grid, start - _ARRIVAL_BACK * grid.step * u, _ARRIVAL_REACHES[0])
     if not len(nodes):
-        nodes, extra = near_poses(grid, start, 2.0)
+        nodes, extra = near_poses(grid, start, _ARRIVAL_REACHES[1])
     return nodes, extra
 
 
@@ -120,7 +128,7 @@ class Route(Legs):
 
     Args:
         points, signs, turns, heading: see `pushplan.control.Legs`.
-        cost: length, and what is pushed about on the way [m].
+        cost: length, and what is pushed about on it [m].
     """
 
     cost: float
@@ -158,19 +166,19 @@ def find_route(
     here = scene.world.robot_pose
     end = float(start[2])
     ahead = scene.size * np.array([math.cos(here[2]), math.sin(here[2])])
-    near = [here[:2], *(here[:2] + fraction * ahead for fraction in _AWAY)]
+    near = [here[:2], *(here[:2] + fraction * ahead for fraction in _FIRST_LEGS)]
     expected = math.inf
     if target >= 0:
         weights = problem.weights.copy()
         if approach.target == target:
             weights[target] += config.around_cost
-            expected = _MORE * float(total[best]) + scene.size
+            expected = _MOST_DETOUR * float(total[best]) + scene.size
         else:
             weights[target] += config.target_cost
         problem = problem._replace(weights=weights)
     cheapest: Route | None = None
     for last in ([start[:2]], []):  # it may be too near to a wall to turn there
-        for points, longest in ((corners, len(corners) + 1), (every, _LONGEST), (every, 1)):
+        for points, longest in ((corners, len(corners) + 1), (every, _LONGEST_LEG), (every, 1)):
             through = np.array([*near, *points, *last])
             found = _cheapest(through, float(here[2]), end, len(near), longest, problem)
             if found is None or (cheapest is not None and found.cost >= cheapest.cost):
@@ -234,7 +242,7 @@ def _cheapest(
 def _turned(here: FloatArray, to: float, turn: float) -> FloatArray:
     """Poses (N, 3) of a turn on the spot after ``here``, close enough for a prediction."""
     angle = turn_to(float(here[2]), to, turn)
-    steps = max(1, math.ceil(abs(angle) / 0.3))
+    steps = max(1, math.ceil(abs(angle) / _TURN_STEP))
     poses = np.repeat(here[None], steps, axis=0)
     poses[:, 2] += np.linspace(0.0, angle, steps + 1)[1:]
     return poses
@@ -246,12 +254,12 @@ def _corners(places: FloatArray) -> list[FloatArray]:
     for before, here, after in zip(places, places[1:], places[2:], strict=False):
         one = here - before
         two = after - here
-        bends = abs(one[0] * two[1] - one[1] * two[0]) > 1e-9 or float(one @ two) < 0.0
+        turns = abs(one[0] * two[1] - one[1] * two[0]) > 1e-9 or float(one @ two) < 0.0
         stands = not one.any() or not two.any()
-        if (bends or stands) and (here != points[-1]).any():
+        if (turns or stands) and (here != points[-1]).any():
             points.append(here)
     if (places[-1] != points[-1]).any():
         points.append(places[-1])
-    while len(points) > _MOST:
+    while len(points) > _MOST_CORNERS:
         points = points[:1] + points[1:-1:2] + points[-1:]
     return points

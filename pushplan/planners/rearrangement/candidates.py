@@ -24,6 +24,16 @@ _HARD_OBJECTS = 3
 _EARLY = 0.6
 """Distance before a failure at which a push ends that does not deliver its object [circumscribed
 radii]."""
+_NEXT_PUSH = 2.0  # least cost of the push that follows a partial one [circumscribed radii]
+_LENGTH_FACTOR = 1.5
+_EXTRA_LENGTH = 4.0
+_TURN_LENGTH = 2.0
+"""Greatest length of a push along a path: times that of the path, and more [circumscribed radii];
+one that begins at an angle has some more to turn."""
+_PARTNER_SPACING = 0.75  # distance of two objects side by side [sum of their radii]
+_PARTNER_WIDTH = 1.3  # greatest such distance [half widths of the bumper]
+_PARTNER_DETOUR = 1.5  # by so much longer the path past a partner may be [circumscribed radii]
+_PARTNER_TURN = 1.0  # greatest turn at the partner [rad]
 _OWN_CLEARANCE = 0.75
 """Clearance of an object's path where the table gives none [radii of the object]."""
 _DETOUR = 1.3
@@ -80,7 +90,7 @@ def partial_pushes(scene: PushScene, k: int) -> Iterator[Push]:
                 for push in simulate(scene, replace(attempt, relocates=True, limit=limit)):
                     left = costs.at(push.object_poses[k])
                     if left < now - GAIN * scene.size:
-                        yield replace(push, cost=push.cost + left + 2.0 * scene.size)
+                        yield replace(push, cost=push.cost + left + _NEXT_PUSH * scene.size)
 
 
 def attempts(scene: PushScene, k: int, row: PushPrimitive) -> Iterator[PushAttempt]:
@@ -89,8 +99,11 @@ def attempts(scene: PushScene, k: int, row: PushPrimitive) -> Iterator[PushAttem
         yield from _line_attempts(scene, k, row)
         return
     for path, shift_of_path, wanted in _paths(scene, k, row):
-        towards = initial_heading(path, 0.5 * scene.size)
-        limit = 1.5 * path_length(path) + (6.0 if row.leans[0] else 4.0) * scene.size
+        towards = initial_heading(path, scene.controller.ahead)
+        extra = _EXTRA_LENGTH
+        if row.leans[0]:
+            extra += _TURN_LENGTH
+        limit = _LENGTH_FACTOR * path_length(path) + extra * scene.size
         shifts = [fraction * scene.half for fraction in row.shifts]
         if shift_of_path is not None:
             shifts = [shift_of_path]
@@ -165,11 +178,11 @@ def _paths(
     others = sorted((j for j in scene.left if j != k), key=lambda j: (far[j], j))
     for j in others[: row.partners]:
         other = scene.object_paths.path(scene.poses[j, :2], float(radii[j]), away)
-        width = 0.75 * float(radii[j] + radii[k])
+        width = _PARTNER_SPACING * float(radii[j] + radii[k])
         if (
             other is None
-            or width > 1.3 * scene.half
-            or float(far[j]) + path_length(other) > length + 1.5 * scene.size
+            or width > _PARTNER_WIDTH * scene.half
+            or float(far[j]) + path_length(other) > length + _PARTNER_DETOUR * scene.size
         ):
             continue
         heading = initial_heading(other, scene.size)
@@ -178,6 +191,6 @@ def _paths(
             beside = scene.poses[j, :2] - side * width * v
             approach = beside - box
             turn = math.atan2(approach[1], approach[0]) - heading
-            if abs(math.remainder(turn, math.tau)) <= 1.0:
+            if abs(math.remainder(turn, math.tau)) <= _PARTNER_TURN:
                 points = np.array([box, beside, *other[1:]])
                 yield np.ascontiguousarray(points), side * 0.5 * width, (k, j)

@@ -35,6 +35,7 @@ robot's middle to the left of the object's, as a fraction of half the bumper's w
 _PATHS = ((0.7, False), (0.0, False), (0.0, True))
 """Paths of an object: the clearance that it keeps where there is room [radii of the object], and
 whether it goes to the middle of a receptacle."""
+_TURNING_ROOM = 1.05  # length of the last leg, before which it turns [circumscribed radii]
 _LEANS = tuple(math.radians(lean) for lean in (0, 20, -20, 40, -40))
 """Directions of the last leg against the heading of the push [rad]."""
 
@@ -65,7 +66,6 @@ class GreedyPusher(RearrangementPolicy):
         super()._forget()
         self._attempt: _Attempt | None = None
         self._failures: Counter[int] = Counter()
-        self._away: Recovery | None = None
         self._wait_until = -math.inf
 
     def warm_up(self) -> None:
@@ -74,8 +74,8 @@ class GreedyPusher(RearrangementPolicy):
         super().warm_up()
 
     def _act(self, world: World) -> Twist:
-        command = self._retreat(world) or self._work(PushScene(world, self.config))
-        return command or self._retreat(world) or Twist(0.0, 0.0)
+        command = self._recover(world) or self._work(PushScene(world, self.config))
+        return command or self._recover(world) or Twist(0.0, 0.0)
 
     def _work(self, scene: PushScene) -> Twist | None:
         """The next command of the attempt in hand or of a new one; None where it has ended."""
@@ -90,7 +90,8 @@ class GreedyPusher(RearrangementPolicy):
             if not done:  # it is the box's fault, which comes last from now on
                 self._failures[attempt.box] += 1
             self._attempt = None
-            self._away = Recovery(world, _RETREAT * scene.size, response=response, looks=False)
+            recovery = Recovery(world, _RETREAT * scene.size, response=response, looks=False)
+            self._recovery = recovery.command
         return command
 
     def _drive(self, attempt: _Attempt, scene: PushScene) -> Twist | None:
@@ -122,15 +123,6 @@ class GreedyPusher(RearrangementPolicy):
             failures[ids[k]] += 1
         self._wait_until = world.time + _WAIT
         return None
-
-    def _retreat(self, world: World) -> Twist | None:
-        """Get away from where the last attempt ended."""
-        if self._away is None:
-            return None
-        command = self._away.command(world, self._clock.held)
-        if command is None:
-            self._away = None
-        return command
 
 
 @dataclass(frozen=True)
@@ -211,7 +203,7 @@ def _legs_to(
     if not scene.starts.fits(start):
         return None
     for lean in _LEANS:
-        stop = behind - 1.05 * scene.size * heading_axes(heading + lean)[0]
+        stop = behind - _TURNING_ROOM * scene.size * heading_axes(heading + lean)[0]
         poses = [
             np.array([*place, heading + angle])
             for place, angle in ((behind, lean), (behind, 0.5 * lean), (stop, lean))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -30,9 +30,10 @@ from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.world import InvalidInputError, Plan, PlanningExecutor, Stop, Twist, World
 from pushplan.world.checks import FloatArray, expect
 
+_SAME_OBJECTS = 0.05  # objects have not moved if all by less [circumscribed radii]
 _SAME_PLACE = 0.02  # the robot has not moved if by less [circumscribed radii, rad]
 _MOST_ENDS = 4  # pushes and recoveries that may end in one step until the robot waits
-_RETREAT = 0.3  # distance that the robot backs off where it is stuck [circumscribed radii]
+_RETREAT = 0.3  # distance that the robot backs off where it makes no progress [circumscribed radii]
 
 
 class GtspMpc(RearrangementPolicy):
@@ -53,7 +54,7 @@ class GtspMpc(RearrangementPolicy):
     Attributes:
         given_up: why nothing more is tried with an object, by id.
         plan: the pushes planned last, in order.
-        current_plan: the push in hand, with the way to it; None while there is none.
+        current_plan: the push in hand, with the route to it; None while there is none.
         graph: the graph that they come from.
     """
 
@@ -81,14 +82,13 @@ class GtspMpc(RearrangementPolicy):
         self._choosing: PendingChoice | None = None
         self._execution: PushExecution | None = None
         self._shown: Push | None = None
-        self._recovery: Callable[[World, float], Twist | None] | None = None
         self._searched: PushScene | None = None
         self._cache = RolloutCache()
         self._history = PushHistory()
         self._left = -1
         self._rounds = 0
-        self._stuck = 0
-        self._way_at_end = math.inf
+        self._retreats = 0
+        self._distance_at_end = math.inf
         self._recovered_from: FloatArray = np.full(3, np.inf)
         self._stopped_at: PushScene | None = None
         self.given_up: dict[int, str] = {}
@@ -146,18 +146,9 @@ class GtspMpc(RearrangementPolicy):
             self._left = left
             self._rounds = 0
             self._stopped_at = None
-            self._way_at_end = math.inf
+            self._distance_at_end = math.inf
             self._history.count_progress(self.config)
         return scene
-
-    def _recover(self, world: World) -> Twist | None:
-        """The next command of a recovery; None where none is under way."""
-        if self._recovery is None:
-            return None
-        command = self._recovery(world, self._clock.held)
-        if command is None:
-            self._recovery = None
-        return command
 
     def _choose(self, scene: PushScene) -> bool:
         """Choose a push and begin with it, or with a recovery.
@@ -195,7 +186,7 @@ class GtspMpc(RearrangementPolicy):
         return None
 
     def _show(self, world: World, execution: PushExecution) -> None:
-        """Make `current_plan` that of the push in hand, once for the way and once for the push."""
+        """Make `current_plan` that of the push in hand: of its route, then of the push."""
         push = execution.push
         if push is not self._shown and len(push.object_poses) == len(world.movables):
             self._shown = push
@@ -262,12 +253,12 @@ class GtspMpc(RearrangementPolicy):
             self._cache = RolloutCache()
             return True
         remaining = scene.remaining_now[scene.left]
-        way = float(remaining[np.isfinite(remaining)].sum())
+        distance = float(remaining[np.isfinite(remaining)].sum())
         tried = self._history.failures or self._history.relocations
-        if not tried or way >= self._way_at_end - scene.size:
+        if not tried or distance >= self._distance_at_end - scene.size:
             self._stopped_at = scene
             return False
-        self._way_at_end = way
+        self._distance_at_end = distance
         self._rounds = 0
         self._history = PushHistory()
         return True
@@ -278,7 +269,7 @@ class GtspMpc(RearrangementPolicy):
         self.current_plan = None
         push = execution.push
         if end is ExecutionEnd.DONE and not push.relocates:
-            self._stuck = 0
+            self._retreats = 0
             return
         if end is not ExecutionEnd.OBSOLETE:  # also a relocation, so that another comes next
             self._history.failures[signature(push)] += 1
@@ -287,12 +278,14 @@ class GtspMpc(RearrangementPolicy):
         if end is ExecutionEnd.STUCK:
             distance = _RETREAT * scene.size
             self._recovery = Recovery(
-                scene.world, distance, skip=self._stuck, looks=False, searches=False
+                scene.world, distance, skip=self._retreats, looks=False, searches=False
             ).command
-            self._stuck += 1
+            self._retreats += 1
 
 
 def _alike(one: PushScene, other: PushScene) -> bool:
     """Return True if nothing has moved between two scenes."""
     same = np.array_equal(one.world.movables.ids, other.world.movables.ids)
-    return same and bool(np.hypot(*(one.poses - other.poses)[:, :2].T).max() < 0.05 * one.size)
+    return same and bool(
+        np.hypot(*(one.poses - other.poses)[:, :2].T).max() < _SAME_OBJECTS * one.size
+    )

@@ -1,4 +1,4 @@
-"""The way of objects to their goal on one map, worked out once: its length, course and cost."""
+"""Paths of objects to their goal on one map, worked out once: length, course and cost."""
 
 from __future__ import annotations
 
@@ -24,11 +24,14 @@ from pushplan.world import ClearanceArea, Goal, Receptacle, RobotModel, StaticMa
 from pushplan.world.checks import BoolArray, FloatArray
 
 _INSET = 1.05  # distance of an object from the edges of a receptacle when it is done [radii]
-_KEPT = 20_000  # greatest number of lengths and paths that are kept
+_MOST_KEPT = 20_000  # greatest number of lengths and paths that are kept
 _CELL = 0.125  # side of a cell [circumscribed radii of the robot]
 _MOST_CELLS = 160  # along the longer side of a map
+_BEYOND = 0.6  # how far beyond the middle of a receptacle a path goes [length up to it]
+_HALF_DEPTH = 0.85  # from the outline to the middle of an object, roughly [radii]
+_GOAL_CELLS = 0.75  # distance from where an object is done at which a cell counts as that [cells]
 _DRAG_COST = 10.0
-"""Cost of a metre of an object's way on which the robot does not fit behind it [m pushed]."""
+"""Cost of a metre of an object's path on which the robot does not fit behind it [m pushed]."""
 
 
 class ObjectPaths:
@@ -42,10 +45,10 @@ class ObjectPaths:
     def __init__(self, static: StaticMap, goal: Goal) -> None:
         assert isinstance(goal, Receptacle | ClearanceArea)
         plain = goal_distances(static, goal)
-        self.length = functools.lru_cache(_KEPT)(lambda x, y: plain.path_from((x, y)).length)
+        self.length = functools.lru_cache(_MOST_KEPT)(lambda x, y: plain.path_from((x, y)).length)
         """Shortest path of a point (x, y) to the goal [m]; inf if there is none."""
         distances = functools.cache(functools.partial(_distances, static, goal))
-        self._paths = functools.lru_cache(_KEPT)(functools.partial(_path, goal, distances))
+        self._paths = functools.lru_cache(_MOST_KEPT)(functools.partial(_path, goal, distances))
 
     def path(
         self, point: FloatArray, radius: float, clearance: float, deep: bool = False
@@ -96,7 +99,7 @@ def _path(
     if isinstance(goal, Receptacle):  # on to its far side, where it may be pushed
         middle = goal.polygon.mean(axis=0)
         last = points[-1]
-        points = np.concatenate([points, (middle + 0.6 * (middle - last))[None]])
+        points = np.concatenate([points, (middle + _BEYOND * (middle - last))[None]])
     steps = np.hypot(*np.diff(points, axis=0).T)
     points = points[np.concatenate([[True], steps > 1e-6 * radius])]
     return np.ascontiguousarray(points) if len(points) > 1 else None
@@ -109,9 +112,9 @@ def object_paths(static: StaticMap, goal: Goal) -> ObjectPaths:
 
 
 class PushCostToGo:
-    """Cost of the cheapest way of an object to its goal [m], by the place of its middle.
+    """Cost of the cheapest path of an object to its goal [m], by the place of its middle.
 
-    The way leads from cell to cell in sixteen directions. A metre of it costs a metre where the
+    The path leads from cell to cell in sixteen directions. A metre of it costs a metre where the
     robot fits behind the object among what is static, and more where the object has to be brought
     on in another way: out of corners and gaps, and away from walls. Other objects do not count.
 
@@ -157,7 +160,7 @@ class PushCostToGo:
             np.stack(np.meshgrid(x, y), axis=2),
             open_cells,
             np.array(SHIFTS) * half_width,
-            float(robot.vertices[:, 0].max()) + slack + 0.85 * radius,
+            float(robot.vertices[:, 0].max()) + slack + _HALF_DEPTH * radius,
             footprint(robot, margin),
             obstacles(static),
         )
@@ -166,7 +169,7 @@ class PushCostToGo:
         self._costs: FloatArray = costs[i, j] + self._drag_cost * self._step * away
 
     def _search(self, is_open: BoolArray, pushable: BoolArray, goal: BoolArray) -> FloatArray:
-        """(rows, cols) cost of the way from each cell [m]."""
+        """(rows, cols) cost of the path from each cell [m]."""
         rows, cols = is_open.shape
         i, j = np.nonzero(is_open)
         # (16, cells)
@@ -207,7 +210,7 @@ def _is_goal(goal: Goal, radius: float, middles: Any, step: float) -> BoolArray:
         places = [goal.polygon.mean(axis=0)[None]]
     shapes = shapely.union_all([shapely.MultiPoint(place).convex_hull for place in places])
     shapely.prepare(shapes)
-    out: BoolArray = shapely.distance(shapes, middles) <= 0.75 * step
+    out: BoolArray = shapely.distance(shapes, middles) <= _GOAL_CELLS * step
     return out
 
 

@@ -20,8 +20,11 @@ from pushplan.world.polyline import arc_lengths, goes_back, step_lengths
 _FAILURE_COST = 3.0  # of a push, for each time that it has failed [circumscribed radii]
 _RELOCATION_COST = 1.0
 """Of a relocation, for each one of its object since something was done [circumscribed radii]."""
-_INSIDE = 0.7  # inscribed over circumscribed radius of a box
-_STILL = 1e-6  # a step that is shorter turns on the spot [circumscribed radii]
+_SAME_HEADING = 0.3
+_SAME_ARC = 0.6
+"""Headings that differ by less may have one `signature`, of pushes and of relocations [rad]."""
+_BOX_INSCRIBED = 0.7  # inscribed over circumscribed radius of a box
+_ON_THE_SPOT = 1e-6  # a step that is shorter turns on the spot [circumscribed radii]
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +97,14 @@ def signature(push: Push) -> tuple[object, ...]:
     """Return the key by which a failed push is recognised."""
     heading = math.remainder(float(push.start[2]), math.tau)
     if push.controller == "arc":
-        return push.target, push.controller, round(heading / 0.6)
-    return push.target, push.controller, round(heading / 0.3), round(push.shift, 2), push.gain
+        return push.target, push.controller, round(heading / _SAME_ARC)
+    return (
+        push.target,
+        push.controller,
+        round(heading / _SAME_HEADING),
+        round(push.shift, 2),
+        push.gain,
+    )
 
 
 @dataclass
@@ -134,7 +143,7 @@ class PushHistory:
 
 
 def push_plan(world: World, route: Legs | None, push: Push) -> Plan:
-    """The way to a push and the push itself, at full speed and turn rate.
+    """The route to a push and the push itself, at full speed and turn rate.
 
     A push is predicted at its end only: in between, ``object_poses`` follow the straight line from
     where the objects are, as far as the robot has pushed. An object that leaves the world ends in
@@ -146,10 +155,10 @@ def push_plan(world: World, route: Legs | None, push: Push) -> Plan:
         push: the push.
     """
     robot = world.robot
-    way = _way(world, route)
-    poses = np.concatenate([way, push.poses])
+    approach = _route_poses(world, route)
+    poses = np.concatenate([approach, push.poses])
     along = arc_lengths(poses)
-    first = len(way)
+    first = len(approach)
     lengths = step_lengths(poses)
     turns = wrap_angle(np.diff(poses[:, 2]))
     signs = np.where(goes_back(poses, robot.circumscribed_radius), -1.0, 1.0)
@@ -158,13 +167,13 @@ def push_plan(world: World, route: Legs | None, push: Push) -> Plan:
     turn_rates = np.zeros(len(poses))
     moving = steps > 0.0
     np.divide(signs[:-1] * lengths, steps, out=speeds[:-1], where=moving)
-    speeds[:-1][lengths < _STILL * robot.circumscribed_radius] = 0.0
+    speeds[:-1][lengths < _ON_THE_SPOT * robot.circumscribed_radius] = 0.0
     np.divide(turns, steps, out=turn_rates[:-1], where=moving)
     done = np.maximum(along - along[first], 0.0) / max(float(along[-1] - along[first]), 1e-12)
     start = world.movables.poses
     ends = np.array(push.object_poses)
     gone = ends[:, 0] >= 0.5 * REMOVED
-    ahead = np.max(robot.vertices[:, 0]) + _INSIDE * world.movables.radii[gone]
+    ahead = np.max(robot.vertices[:, 0]) + _BOX_INSCRIBED * world.movables.radii[gone]
     x, y, theta = poses[-1]
     ends[gone, 0] = x + ahead * np.cos(theta)
     ends[gone, 1] = y + ahead * np.sin(theta)
@@ -182,7 +191,7 @@ def push_plan(world: World, route: Legs | None, push: Push) -> Plan:
     )
 
 
-def _way(world: World, route: Legs | None) -> FloatArray:
+def _route_poses(world: World, route: Legs | None) -> FloatArray:
     """(N, 3) poses before and after each turn on the spot of a route, from where the robot is."""
     poses = [np.array(world.robot_pose)]
     if route is not None:

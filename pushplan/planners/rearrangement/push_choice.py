@@ -22,7 +22,7 @@ from pushplan.planners.rearrangement.approach import (
 )
 from pushplan.planners.rearrangement.goal_kernels import REMOVED
 from pushplan.planners.rearrangement.push import Push, PushCost, PushHistory
-from pushplan.planners.rearrangement.push_graph import PushGraph, build_push_graph, no_penalty
+from pushplan.planners.rearrangement.push_graph import PushGraph, build_push_graph
 from pushplan.planners.rearrangement.push_order import sequence_pushes
 from pushplan.planners.rearrangement.push_scene import MARGIN, PushScene, pose_distance
 from pushplan.planners.rearrangement.push_simulator import resimulate
@@ -31,9 +31,10 @@ from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import path_length, path_lengths
 from pushplan.world.stop import wants_own_budget
 
-# greatest distance of a scene from the predicted one [circumscribed radii]
-_ROBOT = 0.5
-_OBJECT = 0.2
+_ROBOT_OFF = 0.5
+_OBJECT_OFF = 0.2
+"""Greatest distances from the predicted poses in a scene that a choice is still good for
+[circumscribed radii]."""
 _NEAREST = 2
 """For so many objects, the nearest ones, relocations are looked for at first."""
 
@@ -61,7 +62,7 @@ class PushChoice:
         graph: the candidate pushes.
         plan: the pushes to be made, in order.
         first: the first of them with the route to it; None if there is none.
-        recovery: (N, 3) poses out of a tight place, where there is no push; None if there are none.
+        recovery: (N, 3) path out of a tight place, where there is no push; None if there are none.
         interrupted: a stop rule left something out of the search.
         searches: objects for which relocations were searched.
     """
@@ -98,10 +99,10 @@ class PendingChoice:
         ids = now.movables.ids[~now.done]
         if not np.array_equal(ids, then.movables.ids[~then.done]):
             return False
-        if pose_distance(then.world.robot_pose, now.world.robot_pose, size) > _ROBOT:
+        if pose_distance(then.world.robot_pose, now.world.robot_pose, size) > _ROBOT_OFF:
             return False
         pairs = zip(then.poses[~then.done], now.poses[~now.done], strict=True)
-        return all(pose_distance(a, b, size) <= _OBJECT for a, b in pairs)
+        return all(pose_distance(a, b, size) <= _OBJECT_OFF for a, b in pairs)
 
 
 def choose_push(
@@ -112,7 +113,7 @@ def choose_push(
     costs: Sequence[PushCost] = (),
     ahead: bool = False,
 ) -> PendingChoice:
-    """Ask for the best push, or else a way out of a tight place.
+    """Ask for the best push, or else a recovery path.
 
     Args:
         scene: now, or where everything is expected to be.
@@ -171,7 +172,7 @@ def scene_after(scene: PushScene, push: Push) -> PushScene:
     return PushScene(moved, scene.config, scene.cache)
 
 
-def select_push(scene: PushScene, penalty: Callable[[Push], float] = no_penalty) -> PushChoice:
+def select_push(scene: PushScene, penalty: Callable[[Push], float] = lambda _: 0.0) -> PushChoice:
     """Sequence anew: the pushes to make, and the first of them with the route to it.
 
     Where no push home can be carried out, those that end on the way count as well, and where none

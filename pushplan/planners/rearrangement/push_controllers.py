@@ -24,8 +24,8 @@ from pushplan.world.checks import FloatArray, expect
 _MPC_HEADING = math.radians(20.0)
 """A push that begins farther off the object's path is left to the geometric controller."""
 _PROGRESS = 0.05
-"""By so much an object has to get on in the time in which the robot could drive a radius, or turn
-by `_TURN_PATIENCE` [circumscribed radii]."""
+"""Least progress of an object in the time in which the robot could drive a radius, or turn by
+ `_TURN_PATIENCE` [circumscribed radii]."""
 _TURN_PATIENCE = 0.15  # [rad]
 _HEADING_GAIN = 0.5
 _OFFSET_GAIN = 0.3  # [rad/m, times the circumscribed radius]
@@ -89,7 +89,7 @@ class GeometricPusher:
 
 
 class PathPush:
-    """Pushes an object along a path while it stays on the bumper and gets on.
+    """Pushes an object along a path while it stays on the bumper and makes progress.
 
     Args:
         robot: that pushes.
@@ -108,7 +108,7 @@ class PathPush:
         self._progress = ProgressChecker(decrease_by(_PROGRESS * size), patience)
 
     def command(self, scene: PushScene, held: float) -> Twist | None:
-        """The velocity to drive now; None where the object has been lost or does not get on.
+        """The velocity to drive now; None where the object has been lost or makes no progress.
 
         It goes on with an object that is done, for what rides along.
         """
@@ -139,7 +139,7 @@ def make_pusher(scene: PushScene, push: Push, held: float, predictive: bool) -> 
         return lambda now, held: follower.command(now.world.robot_pose, now.world.time, held)
     if push.controller == "line":
         return lambda now, _: _along_line(now, push.start)
-    away = initial_heading(push.object_path, 0.5 * scene.size) - float(world.robot_pose[2])
+    away = initial_heading(push.object_path, scene.controller.ahead) - float(world.robot_pose[2])
     straight = abs(math.remainder(away, math.tau)) < _MPC_HEADING
     # the contact model of `PushingMpc` is that of one object, along its path
     alone = not push.relocates and push.delivers == (push.target,)

@@ -18,7 +18,7 @@ from pushplan.world import PendingResult, PlanningExecutor, RobotModel, Twist
 from pushplan.world.checks import IntArray
 
 _ALIGNED = math.radians(0.4)  # error of a heading that is left where a push begins
-_NEAR = 0.004  # error of the place that is left where a push begins [circumscribed radii]
+_PLACED = 0.004  # error of the place that is left where a push begins [circumscribed radii]
 _LONGER = 1.1
 _FARTHER = 0.4
 """A push home has failed that is longer than predicted by this factor and by this distance
@@ -78,7 +78,7 @@ class PushExecution:
         self._route_follower = LegFollower(
             robot,
             route,
-            near=_NEAR * robot.circumscribed_radius + config.position_noise,
+            near=_PLACED * robot.circumscribed_radius + config.position_noise,
             aligned=_ALIGNED + config.heading_noise,
             response=config.response,
         )

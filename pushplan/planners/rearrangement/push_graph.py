@@ -37,11 +37,14 @@ from pushplan.world.checks import FloatArray, IntArray
 if TYPE_CHECKING:
     import networkx as nx
 
-_PARTS = 3
+_MOST_PARTS = 3
 """Pushes that take more than so many objects along stand for all of them and for each one alone."""
 _MOST_APPROACHES = 150
 """Ends of pushes from which approaches are searched for; up to 50 objects have no more."""
-_FAR = 5.0  # cost of getting to what cannot be got to later [diagonals of the map]
+_SAME_END = 2.0
+_SAME_END_TURN = 0.8
+"""Sides of the boxes of ends of pushes that share their approaches [cells, rad]."""
+_UNREACHABLE = 5.0  # cost of getting to what cannot be got to later [diagonals of the map]
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +111,7 @@ def reduce_to_gtsp(costs: FloatArray, masks: list[int], objects: int) -> GtspRed
 def parts_of(mask: int) -> list[tuple[int, ...]]:
     """The sets of objects that a push stands for."""
     whole = tuple(b for b in range(mask.bit_length()) if mask >> b & 1)
-    if len(whole) > _PARTS:
+    if len(whole) > _MOST_PARTS:
         return [whole, *((b,) for b in whole)]
     return [part for size in range(1, len(whole) + 1) for part in combinations(whole, size)]
 
@@ -171,14 +174,9 @@ class PushGraph:
         return graph
 
 
-def no_penalty(push: Push) -> float:
-    """Nothing."""
-    return 0.0
-
-
 def build_push_graph(
     scene: PushScene,
-    penalty: Callable[[Push], float] = no_penalty,
+    penalty: Callable[[Push], float] = lambda _: 0.0,
     *,
     onward: bool = False,
     relocations: int = 0,
@@ -195,7 +193,17 @@ def build_push_graph(
         thorough: look for ones that cost much more than the best one.
     """
     approach = approach_tree(scene)
-    pushes = candidate_pushes(scene, approach, onward, relocations, thorough)
+    away = np.hypot(*(scene.poses[:, :2] - scene.world.robot_pose[:2]).T)
+    objects = sorted(scene.left, key=lambda k: (float(away[k]), k))
+    pushes = delivering_pushes(scene, objects)
+    if onward:
+        pushes += [push for k in objects for push in partial_pushes(scene, k)]
+    for k in objects:
+        if not relocations or scene.budget.is_used_up:
+            break
+        found = relocating_pushes(scene, k, approach, thorough)
+        pushes += found
+        relocations -= bool(found)
     row = least_costs(approach.costs, arrivals_at(scene.fine.grid, pushes))
     extra = np.array([penalty(push) for push in pushes])
     keep = _best(scene, pushes, row + extra)
@@ -214,42 +222,20 @@ def build_push_graph(
     return PushGraph(tuple(pushes), costs, approach, infeasible)
 
 
-def candidate_pushes(
-    scene: PushScene,
-    approach: ApproachTree,
-    onward: bool = False,
-    relocations: int = 0,
-    thorough: bool = False,
-) -> list[Push]:
-    """All candidates of a scene; the arguments are those of `build_push_graph`."""
-    away = np.hypot(*(scene.poses[:, :2] - scene.world.robot_pose[:2]).T)
-    objects = sorted(scene.left, key=lambda k: (float(away[k]), k))
-    pushes = delivering_pushes(scene, objects)
-    if onward:
-        pushes += [push for k in objects for push in partial_pushes(scene, k)]
-    for k in objects:
-        if not relocations or scene.budget.is_used_up:
-            break
-        found = relocating_pushes(scene, k, approach, thorough)
-        pushes += found
-        relocations -= bool(found)
-    return pushes
-
-
 def _best(scene: PushScene, pushes: Sequence[Push], row: FloatArray) -> list[int]:
     """Indices of the best few pushes for each object, of those that the robot can get to."""
     keep: set[int] = set()
-    shares = [max(1, len(push.delivers)) for push in pushes]
+    counts = [max(1, len(push.delivers)) for push in pushes]
     order = sorted(
         (n for n in range(len(pushes)) if np.isfinite(row[n])),
-        key=lambda n: (pushes[n].cost / shares[n], n),
+        key=lambda n: (pushes[n].cost / counts[n], n),
     )
-    near = sorted(order, key=lambda n: (row[n] + pushes[n].cost) / shares[n])
+    near = sorted(order, key=lambda n: (row[n] + pushes[n].cost) / counts[n])
     ids = scene.movables.ids[scene.left].tolist()
-    count = min(scene.config.per_object, max(2, scene.config.max_pushes // max(1, len(ids))))
+    most = min(scene.config.per_object, max(2, scene.config.max_pushes // max(1, len(ids))))
     for i in ids:
-        keep.update([n for n in order if i in pushes[n].serves][:count])
-        keep.update([n for n in near if i in pushes[n].serves][: count // 2])
+        keep.update([n for n in order if i in pushes[n].serves][:most])
+        keep.update([n for n in near if i in pushes[n].serves][: most // 2])
     return sorted(keep)
 
 
@@ -262,16 +248,16 @@ def _between(scene: PushScene, pushes: Sequence[Push]) -> FloatArray:
     grid = scene.coarse.grid
     ids = scene.movables.ids
     bounds = scene.world.static.bounds
-    far = _FAR * float(np.hypot(*(bounds[2:] - bounds[:2])))
+    far = _UNREACHABLE * float(np.hypot(*(bounds[2:] - bounds[:2])))
     arrivals = arrivals_at(grid, pushes)
     out = np.full((len(pushes), len(pushes)), far)
     known: dict[tuple[object, ...], FloatArray] = {}
-    step = 2.0 * grid.step
+    step = _SAME_END * grid.step
     for n, push in enumerate(pushes):
         key = (
             push.delivers,
             *np.round(push.end[:2] / step).tolist(),
-            round(float(push.end[2]) / 0.8),
+            round(float(push.end[2]) / _SAME_END_TURN),
         )
         if key not in known:
             if len(known) == _MOST_APPROACHES or scene.budget.is_over:

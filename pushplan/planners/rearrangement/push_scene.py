@@ -43,12 +43,19 @@ _STEP = 0.08
 """Distance between two commands of a predicted push."""
 _MOST_STEPS = 5000
 """Greatest number of commands in a predicted push."""
+_CONTACT_STEP = 0.25
+_CONTACT_ROUNDS = 10
+"""Of `QuasiStatic`: coarser than its defaults, as hundreds of pushes are simulated in a plan."""
 _CURVATURE = 1.5
 """Of the robot's path where it steers most [1 / circumscribed radius]."""
 _ARM = 0.8
 """Distance by which a turn of one radian carries an object along."""
 _SLACK = 0.05
 """Clearance between the bumper and the object where a push begins."""
+_TURN_DISTANCE = 0.2
+"""Distance that a turn of an object by one radian is as good as."""
+_FOREMOST = 0.9
+"""Part of the bumper's distance ahead beyond which a corner belongs to the bumper."""
 MARGIN = 0.03
 """Distance that approaches keep from what is static."""
 _LEAST_MARGIN = 0.3 * MARGIN
@@ -60,7 +67,7 @@ _TURN_COST = 0.03
 def pose_distance(pose: FloatArray, other: FloatArray, size: float) -> float:
     """Return the distance between two poses (3,) of an object, turns included, in ``size``."""
     turn = math.remainder(float(pose[2] - other[2]), math.tau)
-    return math.dist(pose[:2], other[:2]) / size + 0.2 * abs(turn)
+    return math.dist(pose[:2], other[:2]) / size + _TURN_DISTANCE * abs(turn)
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +138,7 @@ class PushScene:
     def half(self) -> float:
         """Half the width of the bumper, the robot's foremost edge [m]."""
         vertices = self.world.robot.vertices
-        return float(np.abs(vertices[vertices[:, 0] > 0.9 * self.front, 1]).max())
+        return float(np.abs(vertices[vertices[:, 0] > _FOREMOST * self.front, 1]).max())
 
     @cached_property
     def front(self) -> float:
@@ -147,7 +154,10 @@ class PushScene:
     def _contacts(self) -> tuple[Bodies, Settings]:
         config = self.config
         model = QuasiStatic(
-            config.friction, step=0.25, iterations=10, static_friction=config.static_friction
+            config.friction,
+            step=_CONTACT_STEP,
+            iterations=_CONTACT_ROUNDS,
+            static_friction=config.static_friction,
         )
         return model.bodies(self.world), model.settings(self.world)
 

@@ -20,6 +20,10 @@ from pushplan.world.outline import transform
 
 _STARTS = 300  # free poses around an object at most
 _DRAWS = 10  # poses that are looked at for each of them
+_IN_OBJECT = 0.3
+_RING = (0.2, 1.1)
+"""They lie in a ring round the object, beyond that many of its radii: begin and width of the ring
+[circumscribed radii]."""
 _SPREAD = np.array([0.8191725134, 0.6710436067, 0.5497004779])
 """Steps of an additive recurrence that fills a cube evenly (Roberts 2018)."""
 
@@ -73,7 +77,8 @@ class PushStarts:
         x, y, _ = self.poses[k]
         radius = float(self.movables.radii[k])
         fraction = np.mod(0.5 + np.outer(np.arange(1, _DRAWS * _STARTS + 1), _SPREAD), 1.0)
-        away = 0.3 * radius + self.robot.circumscribed_radius * (0.2 + 1.1 * fraction[:, 0])
+        ring = _RING[0] + _RING[1] * fraction[:, 0]
+        away = _IN_OBJECT * radius + self.robot.circumscribed_radius * ring
         bearing = 2.0 * np.pi * fraction[:, 1]
         heading = 2.0 * np.pi * fraction[:, 2] - np.pi
         poses = np.column_stack([x + away * np.cos(bearing), y + away * np.sin(bearing), heading])

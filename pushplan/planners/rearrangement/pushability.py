@@ -13,7 +13,7 @@ from pushplan.planners.rearrangement.push_simulator import PushAttempt, end_of, 
 from pushplan.world.checks import FloatArray
 
 _ADVANCE = 0.6
-"""By how much of the way that the robot drives an object has to get on, to be pushed at all."""
+"""Least progress of an object that can be pushed at all, as a fraction of the robot's path."""
 _ERRORS = np.array([[0.08, 0.08, 0.15], [-0.08, 0.08, -0.15], [0.0, -0.1, 0.0]])
 """Errors of the prediction that a push home afterwards has to tolerate: x, y [circumscribed
 radii], and heading [rad]."""

@@ -62,6 +62,16 @@ class RearrangementPolicy(ABC):
     def _forget(self) -> None:
         """Begin an episode."""
         self._clock = EpisodeClock(self.config.response)
+        self._recovery: Callable[[World, float], Twist | None] | None = None
+
+    def _recover(self, world: World) -> Twist | None:
+        """The next command of a recovery; None where none is under way."""
+        if self._recovery is None:
+            return None
+        command = self._recovery(world, self._clock.held)
+        if command is None:
+            self._recovery = None
+        return command
 
     @abstractmethod
     def _act(self, world: World) -> Twist:

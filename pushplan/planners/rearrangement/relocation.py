@@ -18,7 +18,7 @@ from pushplan.planners.rearrangement.push_simulator import simulate_primitive
 from pushplan.planners.rearrangement.relocation_search import RelocationSearch
 from pushplan.planners.rearrangement.rollout_cache import Asked
 
-_NEAR = 8.0
+_NEARBY = 8.0
 """Distance from the object beyond which nothing counts for the search [circumscribed radii]."""
 
 
@@ -36,7 +36,7 @@ def relocating_pushes(
     movables = scene.movables
     cache = scene.cache
     found = None
-    near = np.hypot(*(scene.poses[:, :2] - scene.poses[k, :2]).T) < _NEAR * scene.size
+    near = np.hypot(*(scene.poses[:, :2] - scene.poses[k, :2]).T) < _NEARBY * scene.size
     asked = Asked(
         movables.ids[near].tobytes() + scene.poses[near].tobytes(), scene.robot_cell, thorough
     )

@@ -41,14 +41,14 @@ _CURVATURES = (0.0, 0.7, -0.7, 1.6, -1.6)
 _ARC_LENGTH = 1.6  # of one arc
 _DEPTH = 3  # so many arcs follow one another at most
 _EXPANSIONS = 400  # so many states are driven on from, starts not counted
-_LITTLE = 0.25  # part of the gain that helps too where nothing else does
+_LITTLE_GAIN = 0.25  # part of the gain that helps too where nothing else does
 # sides of a box of like poses of the object [circumscribed radii, rad]
 _PLACE = 0.2
 _TURN = 0.5
 _MOST_ALIKE = 3  # so many states with the object in the same place are driven on from
-_DEARER = 2.0
-"""Factor on the cost of the best drive found, up to which others are still looked at."""
-_ENOUGH = 24
+_MOST_EXTRA = 2.0
+"""Greatest extra cost over the best drive found of others that are still looked at."""
+_ENOUGH_MARGINS = 24
 """Margins, over all sides from which a drive helps, after which the search ends."""
 _MOST_SIDES = 20  # so many drives are kept, each from another side
 _HORIZON = 3.0
@@ -109,7 +109,7 @@ class RelocationSearch:
         self._k = k
         self._approach = approach
         self._thorough = thorough
-        self._slack = math.inf if thorough else _DEARER * scene.size
+        self._slack = math.inf if thorough else _MOST_EXTRA * scene.size
         self._horizon = _HORIZON * scene.size
         self._cost_to_go = scene.push_cost_to_go(k)
         step = scene.controller.step
@@ -136,7 +136,7 @@ class RelocationSearch:
         """Drives, each with the cost of what it leaves to be done [m]."""
         scene = self._scene
         k = self._k
-        if can_be_pushed(scene, k, self._horizon):  # but not all the way
+        if can_be_pushed(scene, k, self._horizon):  # but not as far as home
             self._horizon = scene.longest
         now = float(self._rest(scene.poses[[k]])[0])
         for start in itertools.chain(self._behind(), scene.starts.around(k)):
@@ -149,7 +149,7 @@ class RelocationSearch:
         expansions = 0
         sides = Counter[_Cell]()
         alike = Counter[_Cell]()
-        while self._open and expansions < _EXPANSIONS and sides.total() < _ENOUGH:
+        while self._open and expansions < _EXPANSIONS and sides.total() < _ENOUGH_MARGINS:
             if scene.budget.is_over:
                 break
             state = heapq.heappop(self._open)[2]
@@ -183,7 +183,7 @@ class RelocationSearch:
         ]
         """Ends of drives after which the object can be pushed home, with what that costs [m]."""
         if self._thorough or not found:  # also those after which less is left to be done than now
-            gain = GAIN * (_LITTLE if self._thorough else 1.0)
+            gain = GAIN * (_LITTLE_GAIN if self._thorough else 1.0)
             shortest = scene.object_paths.remaining
             found += [
                 (state.rest - float(shortest(state.poses[[k]])[0]) + 2.0 * scene.size, state)
@@ -285,7 +285,7 @@ class RelocationSearch:
         path = scene.object_paths.path(scene.poses[k, :2], radius, 0.0)
         if path is None:
             return
-        towards = initial_heading(path, 0.5 * scene.size)
+        towards = initial_heading(path, scene.controller.ahead)
         for row in scene.config.primitives:
             if row.controller == "arc":
                 for lean, shift in itertools.product(row.leans, row.shifts):

@@ -11,7 +11,7 @@ from pushplan.planners.rearrangement.goal_kernels import REMOVED
 from pushplan.world import Movables
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
-_OLD = 8  # for how many plans what is not asked for is kept
+_PLANS_KEPT = 8  # for how many plans what is not asked for is kept
 
 Primitive = tuple[FloatArray, float, dict[int, FloatArray]]
 """Poses (N, 3) of the robot in a relocation, the cost of what it leaves to be done [m], and poses
@@ -98,7 +98,9 @@ class RolloutCache:
         self.searches = 0
         for entry in self._entries.values():
             entry.age += 1
-        self._entries = {key: entry for key, entry in self._entries.items() if entry.age < _OLD}
+        self._entries = {
+            key: entry for key, entry in self._entries.items() if entry.age < _PLANS_KEPT
+        }
 
     def find(self, key: object, movables: Movables, poses: FloatArray) -> Rollout | None:
         """The rollout with a key of objects at poses (K, 3), if it would come to the same now."""

@@ -184,7 +184,9 @@ def test_forces_obey_coulomb_and_the_limit_surface(robot, friction, offset, angl
     contact = model.contact
     v, w = 0.2, 0.2 * 1.5 * bend / model.reach
     out = np.empty(6)
-    contact_kernels.contact_velocity(contact, s, phi, v, w, 0.1 * model.reach / v, out)
+    contact_kernels.contact_velocity(
+        contact, s, phi, np.cos(phi), np.sin(phi), v, w, 0.1 * model.reach / v, out
+    )
     vn, vt, omega, y, mode, shear = out
     low, high = contact_kernels.line(contact, s)
     assert vn >= -1e-9 and low - 1e-9 <= y <= high + 1e-9

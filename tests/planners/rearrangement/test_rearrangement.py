@@ -35,7 +35,6 @@ from pushplan.planners.rearrangement.pose_search_kernels import PoseSearchProble
 from pushplan.planners.rearrangement.push import signature
 from pushplan.planners.rearrangement.push_choice import select_push
 from pushplan.planners.rearrangement.push_graph import (
-    candidate_pushes,
     parts_of,
     reduce_to_gtsp,
 )
@@ -461,7 +460,7 @@ def test_what_is_remembered_comes_to_the_same():
         fresh = PushScene(first.world.moved(movable_poses=boxes), first.config)
         kept = replace(fresh, cache=cache)
         before = len(cache)
-        one, other = (candidate_pushes(here, approach_tree(here)) for here in (fresh, kept))
+        one, other = (build_push_graph(here).pushes for here in (fresh, kept))
         known += len(one) > len(cache) - before
         assert len(one) == len(other)
         for a, b in zip(one, other, strict=True):
