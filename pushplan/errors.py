@@ -14,6 +14,8 @@ MOST_CHOICES = 12
 NEAREST = 3
 _ALIKE = 0.55
 """Similarity above which the nearest choice may be meant: "circle" is no "receptacle"."""
+_LONGEST_INTEGER = 200
+"""Bits from which on a number is not written out, which takes time with its square."""
 _OURS = os.path.dirname(os.path.abspath(__file__))
 _PYTHONS = os.path.dirname(os.__file__)
 _NOT_A_USERS = ("<", f"{_OURS}{os.sep}", f"{_PYTHONS}{os.sep}")
@@ -123,7 +125,9 @@ class _Short(reprlib.Repr):
         self.maxlevel = 3
 
     def repr_int(self, x: int, level: int) -> str:
-        return repr(x) if x.bit_length() < 200 else f"a number of {x.bit_length()} bits"
+        if x.bit_length() < _LONGEST_INTEGER:
+            return repr(x)
+        return f"a number of {x.bit_length()} bits"
 
 
 short = _Short().repr

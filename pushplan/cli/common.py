@@ -74,7 +74,9 @@ def _finite(value: Any) -> Any:
         return {key: _finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    if isinstance(value, float) and not math.isfinite(value):
+        return None  # JSON has neither NaN nor infinity
+    return value
 
 
 def say_scores(episode: Episode, names: Sequence[str] | None = None, who: str = "") -> None:
@@ -97,4 +99,6 @@ def duration(seconds: float) -> str:
     if seconds < 60.0:
         return f"{seconds:.3g} s"
     minutes = round(seconds / 60.0)
-    return f"{minutes} min" if minutes < 120 else f"{minutes / 60.0:.1f} h"
+    if minutes < 120:
+        return f"{minutes} min"
+    return f"{minutes / 60.0:.1f} h"

@@ -32,7 +32,9 @@ def run(options: argparse.Namespace) -> int:
         observation=FeatureObservation() if features else options.observation,
         action=options.action,
     )
-    facts = {} if options.algorithm is None else {"algorithm": options.algorithm}
+    facts = {}
+    if options.algorithm is not None:
+        facts["algorithm"] = options.algorithm
     specification = describe(env, repeat=options.repeat, training=facts)
     env.close()
     if options.model is None:

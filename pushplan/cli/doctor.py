@@ -28,7 +28,9 @@ def run(options: argparse.Namespace) -> int:
         say_json(found)
     else:
         _tell(found)
-    return 1 if any(found["libraries"][name] is None for name in BASE if name != "ruckig") else 0
+    # without ruckig a limit of jerk is left out, and nothing else
+    needed = [found["libraries"][name] for name in BASE if name != "ruckig"]
+    return 1 if None in needed else 0
 
 
 def examine() -> dict[str, Any]:
@@ -115,5 +117,7 @@ def _tell_kernels(kernels: dict[str, Any]) -> None:
     if kernels["cache"] is None:
         say("no folder for them can be written to: each process compiles anew")
         return
-    more = "" if kernels["compiled"] == kernels["known"] else "; all of them: pushplan compile"
+    more = ""
+    if kernels["compiled"] != kernels["known"]:
+        more = "; all of them: pushplan compile"
     say(f"kept in {kernels['cache']} and its like{more}")

@@ -25,7 +25,8 @@ from pushplan.drawing.figure import FORMATS
 from pushplan.drawing.files import Frame
 from pushplan.drawing.top_view import pushed
 from pushplan.interaction.path_sweepers import default_interaction
-from pushplan.world import Episode, Plan, Policy, ShowsPlan, World
+from pushplan.world import Episode, Plan, Policy, World
+from pushplan.world.policy_abilities import shown_plan
 
 FILMS = (".gif", ".mp4")
 FRAMES = 240
@@ -49,7 +50,7 @@ class Camera:
         """Note one step; what `run_episode` calls."""
         if step == 0:
             self._steps.clear()
-        self._steps.append((world, policy.current_plan if isinstance(policy, ShowsPlan) else None))
+        self._steps.append((world, shown_plan(policy)))
 
     def _predict(self) -> None:
         """Give plans that predict nothing what the default interaction model expects of them."""

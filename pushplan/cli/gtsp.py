@@ -12,13 +12,16 @@ from pushplan.cli.output_files import check_file
 def run(options: argparse.Namespace) -> int:
     """Read, solve, say what was found; 1 if there is no tour."""
     from pushplan.gtsp import GtspConfig, read_gtsp, solve_gtsp, warm_up_solver, write_tour
-    from pushplan.world import Deadline, MaxIterations, stream
+    from pushplan.world import Deadline, MaxIterations, Stop, stream
 
     check_file(options.out)
     instance = read_gtsp(options.file)
     with kernel_progress():
         warm_up_solver()
-    stop = MaxIterations(options.iterations) if options.iterations else Deadline(options.seconds)
+    if options.iterations:
+        stop: Stop = MaxIterations(options.iterations)
+    else:
+        stop = Deadline(options.seconds)
     tour = solve_gtsp(
         instance.costs,
         instance.clusters,

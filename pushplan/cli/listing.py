@@ -112,7 +112,9 @@ def policy_facts(name: str) -> dict[str, str]:
             "description": f"A network trained by {algorithm}.",
         }
     policy = make_policy(name)
-    tasks = "ship_ice" if name in OPEN_WATER else _tasks_of(getattr(policy, "goal_kind", None))
+    tasks = _tasks_of(getattr(policy, "goal_kind", None))
+    if name in OPEN_WATER:
+        tasks = "ship_ice"
     actions = ",".join(getattr(policy, "actions", ()))
     described = _documented("pushplan.planners.registry:POLICIES", name)
     return {"tasks": tasks, "actions": actions, **described}
@@ -181,9 +183,12 @@ def condition_facts(name: str) -> dict[str, str]:
         if isinstance(value := getattr(one.disturbances, item.name), float)
         and value != item.default
     ]
-    disturbed += [f"rate={one.rate:g}"] if one.rate is not None else []
+    if one.rate is not None:
+        disturbed.append(f"rate={one.rate:g}")
     disturbed += [f"{key}={value}" for key, value in one.variations.items()]
-    asked = "no success asked for" if one.success is None else f"success {one.success:g}"
+    asked = "no success asked for"
+    if one.success is not None:
+        asked = f"success {one.success:g}"
     return {"disturbance": " ".join(disturbed) or "nothing", "asked": asked}
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -99,10 +100,11 @@ def _as_dict(options: argparse.Namespace, label: str, result: PlanResult) -> dic
             "wall_time_s": stats.wall_time_s,
             "iterations": stats.iterations,
             "nodes": stats.nodes,
-            **({"first_solution_s": t} if (t := stats.first_solution_s) == t else {}),
         },
         "plan": None,
     }
+    if not math.isnan(stats.first_solution_s):
+        data["stats"]["first_solution_s"] = stats.first_solution_s
     if plan is not None:
         arrays = ("times", "poses", "speeds", "turn_rates")
         data["plan"] = {

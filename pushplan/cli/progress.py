@@ -34,7 +34,9 @@ def progress_of(*policies: str, out: str | None = None) -> Iterator[Progress]:
     try:
         with ExitStack() as running, ExitStack() as compiling:
             compiling.enter_context(kernel_progress(*policies))
-            show = _bar(running, policies) if sys.stderr.isatty() else _Lines(policies)
+            show: Progress = _Lines(policies)
+            if sys.stderr.isatty():
+                show = _bar(running, policies)
 
             def update(done: int, total: int, row: ResultRow | None) -> None:
                 nonlocal finished
@@ -52,7 +54,9 @@ def progress_of(*policies: str, out: str | None = None) -> Iterator[Progress]:
 def _stopped(finished: int, out: str) -> str:
     if not finished:
         return "stopped before an episode was finished\n"
-    episodes = "1 finished episode is" if finished == 1 else f"{finished} finished episodes are"
+    episodes = f"{finished} finished episodes are"
+    if finished == 1:
+        episodes = "1 finished episode is"
     return (
         f"stopped: {episodes} kept in {out}; the same command goes on with the others, "
         f"and 'pushplan report {out}' makes the tables of those that are there\n"
@@ -93,8 +97,9 @@ def _bar(running: ExitStack, policies: tuple[str, ...]) -> Progress:
             pending = PendingKernels(*policies)
         failed += row is not None and row.failed
         text = f"[red]{failed} failed" if failed else ""
-        task = bar.task_ids[0] if bar.task_ids else bar.add_task("", total=total)
-        bar.update(task, completed=done, total=total, description=text)
+        if not bar.task_ids:
+            bar.add_task("", total=total)
+        bar.update(bar.task_ids[0], completed=done, total=total, description=text)
         if not bar.live.is_started:
             running.enter_context(bar)
 
@@ -133,5 +138,7 @@ class _Lines:
         if done == total or now >= self._next:
             self._next = now + _LINE_EVERY_S
             rate = (done - self._there) / max(now - self._began, 1e-3)
-            left = f", about {duration((total - done) / rate)} left" if done < total else ""
+            left = ""
+            if done < total:
+                left = f", about {duration((total - done) / rate)} left"
             sys.stderr.write(f"{done} of {total} episodes, {60.0 * rate:.3g} a minute{left}\n")

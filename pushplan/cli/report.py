@@ -63,7 +63,9 @@ def show(results: Results, options: argparse.Namespace, **written: Any) -> None:
 def show_json(results: Results, pairs: str) -> None:
     """Write the report of a run, and print what its tables say as JSON."""
     page = results.report(pairs=pairs)
-    runs = [results.pooled, results] if len(results.titles) > 1 else [results]
+    runs = [results]
+    if len(results.titles) > 1:
+        runs = [results.pooled, results]
     summaries = [
         {**asdict(one), "title": run.titles[one.setting]} for run in runs for one in run.summary()
     ]

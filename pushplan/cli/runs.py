@@ -21,7 +21,9 @@ def say_status(options: argparse.Namespace) -> int:
     states = {True: "running", False: "at rest", None: "running or not, there are no file locks"}
     say(f"{states[now.active]}: {now.done} of {now.jobs} jobs done")
     if now.per_minute:
-        left = "" if now.left_s is None else f", about {duration(now.left_s)} left"
+        left = ""
+        if now.left_s is not None:
+            left = f", about {duration(now.left_s)} left"
         say(f"{now.per_minute:.3g} a minute{left}")
     if now.failed:
         say(f"{now.failed} failed")

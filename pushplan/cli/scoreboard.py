@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pushplan.metrics import compute, manipulation, navigation
-from pushplan.world import ClearanceArea, Episode, Receptacle, World
+from pushplan.world import Episode, World
 from pushplan.world.checks import BoolArray, FloatArray
 from pushplan.world.polyline import path_length, path_lengths
 
@@ -21,7 +21,7 @@ class Scoreboard:
         self._driven = 0.0
         self._lengths = np.zeros(len(start.movables))
         self._trees: dict[bytes, tuple[float, FloatArray]] = {}
-        self.manipulates = isinstance(start.goal, Receptacle | ClearanceArea)
+        self.manipulates = start.goal_kind == "objects"
 
     def advance(self, world: World, robot_poses: FloatArray, object_poses: FloatArray) -> None:
         """Take in what moved since the last call.
@@ -76,5 +76,7 @@ def closing_lines(episode: Episode) -> list[str]:
     names = ("S_manip", "E_manip", "I_manip", "E_nav", "I_nav")
     values = compute(episode, names)
     scores = "   ".join(f"{name[0]} {value:.3f}" for name, value in values.items())
-    ending = f"success ({episode.reason})" if episode.success else episode.reason
+    ending = episode.reason
+    if episode.success:
+        ending = f"success ({episode.reason})"
     return [ending, scores]

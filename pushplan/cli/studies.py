@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from pushplan.evaluation import Experiment
     from pushplan.evaluation.experiment import Cost
 
+BYTES_PER_MB = 1e6
+BYTES_PER_GB = 1e9
+
 
 def bench(options: argparse.Namespace) -> int:
     """Run the batch, print the table, write plots and page."""
@@ -106,7 +109,9 @@ def _run(experiment: Experiment, out: str, options: argparse.Namespace) -> int:
 
     names = ("workers", "retry_failed", "any_version", "shard")
     chosen = {name: getattr(options, name) for name in names}
-    workers = "a cluster" if options.dask else f"{options.workers or 1} workers"
+    workers = f"{options.workers or 1} workers"
+    if options.dask:
+        workers = "a cluster"
     for line in _cost_lines(experiment.cost(out, **chosen), workers, out):
         (sys.stdout if options.check else sys.stderr).write(f"{line}\n")
     if options.check:
@@ -124,7 +129,9 @@ def _cost_lines(cost: Cost, workers: str, out: str) -> list[str]:
     """Jobs, time and disk in words."""
     if not cost.new:
         return [f"{cost.jobs} jobs, all done"]
-    most = "" if cost.most_s is None else f"; at most {duration(cost.most_s)}, by the time limit"
+    most = ""
+    if cost.most_s is not None:
+        most = f"; at most {duration(cost.most_s)}, by the time limit"
     time = "their time is not known before the first ones are done"
     if cost.seconds is not None:
         time = f"about {duration(cost.seconds)} of episodes, by {cost.stored} stored ones"
@@ -138,4 +145,6 @@ def _cost_lines(cost: Cost, workers: str, out: str) -> list[str]:
 
 
 def _megabytes(size: float) -> str:
-    return f"{size / 1e9:.3g} GB" if size >= 1e9 else f"{size / 1e6:.2g} MB"
+    if size >= BYTES_PER_GB:
+        return f"{size / BYTES_PER_GB:.3g} GB"
+    return f"{size / BYTES_PER_MB:.2g} MB"

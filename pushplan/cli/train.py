@@ -134,11 +134,20 @@ def export(options: argparse.Namespace) -> int:
 
     check_directory(options.out)
     given = options.config
-    config = config_named(options.task, "bc") if given is None else read_config(given)
+    if given is None:
+        config = config_named(options.task, "bc")
+    else:
+        config = read_config(given)
     if config.task != options.task:
         raise InvalidInputError(f"{given} is for task {config.task!r}, not {options.task!r}")
     spec = parse_policy(options.policy)
-    driver = None if options.driver is None else parse_policy(options.driver)
+    more: dict[str, Any] = {}
+    if options.first_seed is not None:
+        more["first_seed"] = options.first_seed
+    if options.driver is not None:
+        driver = parse_policy(options.driver)
+        more["driver"] = driver.make()
+        more["driver_label"] = driver.label
     folder = record(
         config,
         spec.make(),
@@ -147,9 +156,7 @@ def export(options: argparse.Namespace) -> int:
         episodes=options.episodes,
         noise=options.noise,
         hold=options.hold,
-        **({} if options.first_seed is None else {"first_seed": options.first_seed}),
-        driver=None if driver is None else driver.make(),
-        driver_label=None if driver is None else driver.label,
+        **more,
     )
     about = read_metadata(folder)
     say(

@@ -87,7 +87,9 @@ class Canvas:
         return self.image.reduce(SMOOTHING)
 
     def _width(self, width_px: float) -> int:
-        return max(1, round(width_px * self.unit * SMOOTHING)) if width_px > 0.0 else 0
+        if width_px <= 0.0:
+            return 0
+        return max(1, round(width_px * self.unit * SMOOTHING))
 
     def line(self, points: FloatArray, color: Color, width_px: float, dash_m: float = 0.0) -> None:
         """An open line through (N, 2) points [m], dashed if ``dash_m`` is positive."""

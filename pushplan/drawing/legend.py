@@ -62,7 +62,7 @@ def legend_of(
         has_goal = bool(np.hypot(*(goal.center - nearest)) < goal.radius)
     wheeled = objects.wheeled & ~objects.fixed
     fixed = objects.fixed
-    has_walls = bool(len(world.static.polygons) or len(world.static.segments))
+    has_walls = not world.static.is_empty
     predicted = plan is True or (not isinstance(plan, bool) and bool(pushed(world, plan)))
     entries = {
         Entry("robot", palette.robot, palette.robot_edge): True,
@@ -113,8 +113,11 @@ def add_strips(
         box = (k * x, k * y, k * (x + 2 * size), k * (y + size))
         middle = k * (y + size // 2)
         if entry.line:
-            starts = range(box[0], box[2], k * size) if entry.dashed else [box[0]]
-            length = k * (round(0.6 * size) if entry.dashed else 2 * size)
+            starts = range(box[0], box[2], 2 * k * size)
+            length = 2 * k * size
+            if entry.dashed:
+                starts = range(box[0], box[2], k * size)
+                length = k * round(0.6 * size)
             for at in starts:
                 pen.line((at, middle, at + length, middle), fill=entry.edge, width=2 * k)
         else:

@@ -55,6 +55,6 @@ WATER_PALETTE = Palette(
 
 def palette_of(world: World) -> Palette:
     """Water where the goal is a line and nothing is static, else a floor."""
-    static = world.static
-    is_open = not len(static.polygons) and not len(static.segments)
-    return WATER_PALETTE if is_open and isinstance(world.goal, GoalLine) else FLOOR_PALETTE
+    if world.static.is_empty and isinstance(world.goal, GoalLine):
+        return WATER_PALETTE
+    return FLOOR_PALETTE

@@ -67,7 +67,7 @@ def draw_world(
     draw_moving(canvas, world, plan, trail, object_trails)
     picture = canvas.finish()
     if text:
-        lines = [text] if isinstance(text, str) else [str(line) for line in text]
+        lines = [text] if isinstance(text, str) else list(map(str, text))
         _write(lines, picture, canvas.unit)
     return np.asarray(picture)
 
@@ -135,7 +135,7 @@ def view_bounds(world: World, size_px: int, view: float | None) -> Bounds:
 def _with_walls(static: StaticMap) -> FloatArray:
     """The bounds and a little of the walls around them: (4,) x_min, y_min, x_max, y_max [m]."""
     box: FloatArray = static.bounds
-    if not len(static.polygons) and not len(static.segments):
+    if static.is_empty:
         return box
     corners = np.concatenate(static.convex_parts)
     rim = RIM * float((box[2:] - box[:2]).max())

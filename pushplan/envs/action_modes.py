@@ -113,7 +113,9 @@ def waiting(command: Twist, periods: float = 1.0, *, then: Motion | None = None)
 
     def motion(pose: FloatArray, time: float, held: bool) -> tuple[Twist, float] | None:
         wanted = next(first, None)
-        return then(pose, time, held) if wanted is None and then is not None else wanted
+        if wanted is None and then is not None:
+            return then(pose, time, held)
+        return wanted
 
     return motion
 

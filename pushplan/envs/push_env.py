@@ -24,11 +24,9 @@ from pushplan.imports.on_demand import look_up
 from pushplan.observation import ObservationBuilder
 from pushplan.world import (
     Action,
-    ClearanceArea,
     InvalidInputError,
     Movables,
     PushplanError,
-    Receptacle,
     ScenarioError,
     Twist,
     UnknownNameError,
@@ -96,7 +94,8 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
             self._simulator = look_up("simulator", SIMULATORS, simulator)()
         self._may_adapt = action is None
         action = chosen_action(task_class, action)
-        preset = default_preset(task, simulator) if preset is None else preset
+        if preset is None:
+            preset = default_preset(task, simulator)
         if preset not in task_class.presets:
             raise UnknownNameError(f"preset of {task}", preset, task_class.presets)
         self._renderer = Renderer(render_mode, self._simulator)
@@ -115,7 +114,9 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         if not hasattr(observation, "observe"):
             raise UnknownNameError(f"observation of {task}", observation, task_class.observations)
         self._builder: ObservationBuilder = observation
-        self._first_seed = None if seed is None else integer("seed", seed, low=0)
+        if seed is not None:
+            seed = integer("seed", seed, low=0)
+        self._first_seed = seed
         self._world: World | None = None
         self._trace: Trace | None = None
         self._over = "reset() has not been called"
@@ -207,10 +208,15 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         """
         if options:
             raise InvalidInputError(f"reset() knows no options, got {options!r:.80}")
-        seed = self._first_seed if seed is None else integer("seed", seed, low=0)
+        if seed is not None:
+            seed = integer("seed", seed, low=0)
+        else:
+            seed = self._first_seed
         self._first_seed = None
         super().reset(seed=seed)
-        layout = int(self.np_random.integers(_SEED_LIMIT)) if seed is None else seed
+        layout = seed
+        if layout is None:
+            layout = int(self.np_random.integers(_SEED_LIMIT))
         world = self.task.start(stream(layout, "layout"))
         self._simulator.build(world, self.task.materials)
         self._world = world
@@ -222,7 +228,7 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         self._over = ""
         self._renderer.show(world)
         info = _info(StepOutcome(0.0, False, "", False, False), 0.0, False)
-        if isinstance(world.goal, Receptacle | ClearanceArea):
+        if world.goal_kind == "objects":
             info["completed"] = np.zeros(len(world.movables), dtype=bool)
         return self._observe(world), info
 
@@ -340,7 +346,9 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
 
     def render(self) -> NDArray[np.uint8] | None:
         """The scene now as (H, W, 3) uint8; None in ``"human"`` mode, which draws by itself."""
-        return None if self.render_mode is None else self._renderer.render(self.true_world)
+        if self.render_mode is None:
+            return None
+        return self._renderer.render(self.true_world)
 
     def close(self) -> None:
         """Close the window, if there is one; may be called again."""
@@ -383,15 +391,18 @@ class _Roster:
 def _space(builder: ObservationBuilder, reach: float) -> Box:
     """The space of an observation; numbers are bounded by what the task can reach."""
     kind: Any = np.dtype(builder.dtype)
-    low, high = (
-        np.broadcast_to(np.clip(np.asarray(bound, dtype=np.float64), -reach, reach), builder.shape)
-        if kind.kind == "f"
-        else np.broadcast_to(np.asarray(bound, dtype=kind), builder.shape)
-        for bound in (builder.low, builder.high)
-    )
-    return Box(low.astype(kind), high.astype(kind), builder.shape, kind)
+    limits = []
+    for bound in (builder.low, builder.high):
+        limit = np.asarray(bound)
+        if kind.kind == "f":
+            limit = np.clip(np.asarray(bound, dtype=np.float64), -reach, reach)
+        limits.append(np.broadcast_to(limit, builder.shape).astype(kind))
+    low, high = limits
+    return Box(low, high, builder.shape, kind)
 
 
 def _info(outcome: StepOutcome, work: float, held: bool) -> dict[str, Any]:
     info = {"success": outcome.success, "reason": outcome.reason, "work": work, "held": held}
-    return info if outcome.completed is None else {**info, "completed": outcome.completed}
+    if outcome.completed is not None:
+        info["completed"] = outcome.completed
+    return info

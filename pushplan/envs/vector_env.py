@@ -251,7 +251,9 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
 
     def set_attr(self, name: str, values: Any) -> None:
         """Set an attribute of every environment: one value for all, or a list with one for each."""
-        each = values if isinstance(values, list | tuple) else [values] * self.num_envs
+        each = values
+        if not isinstance(values, list | tuple):
+            each = [values] * self.num_envs
         if len(each) != self.num_envs:
             raise InvalidInputError(
                 f"values must be one for each of {self.num_envs} environments, got {len(each)}"

@@ -130,19 +130,22 @@ def suites_of(given: Any, episodes: int | None, seed: int) -> tuple[Suite, ...]:
     """
     from pushplan.scenarios import Suite, suite, suite_names, world_suite
 
-    if isinstance(given, str):
-        names = [name.strip() for name in given.split(",")]
-        for name in names:
-            if name not in suite_names() and Path(name).is_file():
-                raise InvalidInputError(
-                    f"{name!r} is a file, no suite and no folder of worlds: give its folder as "
-                    f"'{Path(name).parent}/', or run one world with "
-                    f"'pushplan run --task room --set world_file={name} --policy NAME'"
-                )
-        return tuple(
-            world_suite(name, episodes=episodes or 1, first_seed=seed)
-            if "/" in name
-            else suite(name, episodes=episodes, first_seed=seed)
-            for name in names
-        )
-    return (given if isinstance(given, Suite) else Suite("scenarios", 1, tuple(given)),)
+    if isinstance(given, Suite):
+        return (given,)
+    if not isinstance(given, str):
+        return (Suite("scenarios", 1, tuple(given)),)
+    names = [name.strip() for name in given.split(",")]
+    for name in names:
+        if name not in suite_names() and Path(name).is_file():
+            raise InvalidInputError(
+                f"{name!r} is a file, no suite and no folder of worlds: give its folder as "
+                f"'{Path(name).parent}/', or run one world with "
+                f"'pushplan run --task room --set world_file={name} --policy NAME'"
+            )
+    found = []
+    for name in names:
+        if "/" in name:
+            found.append(world_suite(name, episodes=episodes or 1, first_seed=seed))
+        else:
+            found.append(suite(name, episodes=episodes, first_seed=seed))
+    return tuple(found)

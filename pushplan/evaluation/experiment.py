@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import tempfile
 import zlib
@@ -15,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from pushplan.evaluation.report.results import Results
-from pushplan.evaluation.run.batch import TRACES, Progress, run_batch
+from pushplan.evaluation.run.batch import TRACES, Progress, run_batch, worker_count
 from pushplan.evaluation.run.compatibility import is_wanted, misfits
 from pushplan.evaluation.run.job_identity import identified
 from pushplan.evaluation.run.job_limits import MEMORY_MB
@@ -187,10 +186,12 @@ class Experiment:
             label = job.policy.label
             known = ((label, setting_of(*job.key[1:])), label, None)
             seconds += next(means[key] for key in known if key in means)
+        size = float(EPISODE_BYTES)
         files = list((out / "episodes").glob("*.npz"))[:_MEASURED]
-        size = float(np.mean([file.stat().st_size for file in files])) if files else EPISODE_BYTES
+        if files:
+            size = float(np.mean([file.stat().st_size for file in files]))
         there = next(one for one in (out.absolute(), *out.absolute().parents) if one.exists())
-        abreast = max(1, min(os.cpu_count() or 1 if workers is None else workers, len(new)))
+        abreast = max(1, min(worker_count(workers), len(new)))
         if self.settings.timeout_s is not None:
             most_s = self.settings.timeout_s * len(new) / abreast
         return Cost(

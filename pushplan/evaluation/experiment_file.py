@@ -128,9 +128,10 @@ def _suite(given: object, episodes: int, each: int, seed: int, folder: Path) -> 
         found = Suite(path.stem, 1, tuple(load_scenarios(path)))
     elif "worlds" in entry:
         worlds = entry["worlds"]
-        names = [worlds] if isinstance(worlds, str) else _list("worlds", worlds)
+        if isinstance(worlds, str):
+            worlds = [worlds]
         found = world_suite(
-            [_path(expect("worlds", name, str), folder) for name in names],
+            [_path(expect("worlds", name, str), folder) for name in _list("worlds", worlds)],
             episodes=entry.get("episodes", each),
             first_seed=first,
             **{key: expect(key, entry[key], str) for key in _WORLDS if key in entry},
@@ -171,7 +172,9 @@ def _policies(given: object, folder: Path) -> Iterable[PolicySpec]:
         chosen = dict(zip(sweep, combination, strict=True))
         words = ""
         for name, value in chosen.items():
-            text = f"{value:g}" if isinstance(value, int | float) else str(value)
+            text = str(value)
+            if isinstance(value, int | float):
+                text = f"{value:g}"
             words += f"@{name}-{re.sub(r'[^A-Za-z0-9_.+-]', '_', text)}"
         yield PolicySpec(f"{spec.label}{words}"[:64], spec.source, {**options, **chosen})
 

@@ -79,7 +79,9 @@ class _Loader(_Safe):
         node = super().compose_mapping_node(anchor)
         seen = set()
         for key, _ in node.value:
-            name = (key.tag, key.value) if isinstance(key, yaml.ScalarNode) else id(key)
+            name: Any = id(key)
+            if isinstance(key, yaml.ScalarNode):
+                name = (key.tag, key.value)
             if name in seen:
                 raise _refusal(f"the key {key.value!r} stands in one mapping twice", key)
             seen.add(name)

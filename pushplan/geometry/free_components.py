@@ -37,7 +37,9 @@ class FreeComponents(ArrayRecord):
         """The component of a point (2,) [m]; 0 where the disc does not fit, or out of bounds."""
         row, col = self.grid.cell(*(float(value) for value in np.asarray(point)[:2]))
         rows, cols = self.grid.shape
-        return int(self.labels[row, col]) if 0 <= row < rows and 0 <= col < cols else 0
+        if not (0 <= row < rows and 0 <= col < cols):
+            return 0
+        return int(self.labels[row, col])
 
     def of_goal(self, goal: NavigationGoal) -> set[int]:
         """The components that hold a part of the goal."""

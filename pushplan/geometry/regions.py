@@ -24,7 +24,7 @@ class Polygons(ArrayRecord):
     parts: tuple[FloatArray, ...]
 
 
-Target = GoalDisc | GoalLine | Receptacle | ClearanceArea | Polygons
+Target = Goal | Polygons
 
 
 class Regions(NamedTuple):
@@ -47,7 +47,7 @@ def as_target(goal: Goal | Sequence[ArrayLike]) -> Target:
     Raises:
         InvalidInputError: if it is neither, or there is nothing in the list.
     """
-    if isinstance(goal, GoalDisc | GoalLine | Receptacle | ClearanceArea):
+    if isinstance(goal, Goal):
         return goal
     if isinstance(goal, str | np.ndarray) or not isinstance(goal, Sequence) or not len(goal):
         raise InvalidInputError(
@@ -57,7 +57,9 @@ def as_target(goal: Goal | Sequence[ArrayLike]) -> Target:
     parts = []
     for i, part in enumerate(goal):
         points: FloatArray = array(f"targets[{i}]", part, (None, 2))
-        parts.append(points if len(points) == 2 else convex_outline(f"targets[{i}]", points))
+        if len(points) != 2:  # of two points it is a segment
+            points = convex_outline(f"targets[{i}]", points)
+        parts.append(points)
     return Polygons(tuple(parts))
 
 

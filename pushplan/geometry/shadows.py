@@ -219,8 +219,10 @@ def bend_distances(
     grid = Grid.cover(static.bounds, max(resolution, 1.01 * coarsest))
     contours = contours_of(static)
     ends = np.flatnonzero(np.diff(contours.owner, append=-1)) + 1
-    offsets = np.concatenate([[0], ends]) if len(contours.owner) else np.zeros(1)
-    offsets = frozen(offsets.astype(np.int64))
+    offsets = np.zeros(1, dtype=np.int64)
+    if len(contours.owner):
+        offsets = np.concatenate([offsets, ends])
+    offsets = frozen(offsets)
     table = np.empty((*grid.shape, count), dtype=np.float32)
     _fill_table(
         table,

@@ -46,7 +46,9 @@ def checked_costs(costs: ArrayLike) -> NDArray[np.number]:
         )
     if high == np.inf:
         high = matrix.max(where=matrix < np.inf, initial=low)
-    largest = max(abs(float(low)), abs(float(high))) if low < np.inf else 0.0
+    largest = 0.0
+    if low < np.inf:
+        largest = max(abs(float(low)), abs(float(high)))
     if matrix.dtype.kind in "iu" and largest * len(matrix) >= LARGEST_WHOLE:
         raise InvalidInputError(
             f"whole-number costs must add up to less than 2^53 on a tour, got {largest:g}"

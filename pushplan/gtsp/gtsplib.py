@@ -288,7 +288,10 @@ def _matrix(text: TsplibText, size: int) -> FloatArray:
         return np.array(values).reshape(size, size)
     # columns of one triangle are the rows of the other
     upper = layout.startswith("UPPER") == layout.endswith("ROW")
-    place = np.triu_indices(size, shift) if upper else np.tril_indices(size, -shift)
+    if upper:
+        place = np.triu_indices(size, shift)
+    else:
+        place = np.tril_indices(size, -shift)
     result = np.zeros((size, size))
     result[place] = values
     result[place[::-1]] = values

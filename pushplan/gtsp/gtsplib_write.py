@@ -13,6 +13,9 @@ from pushplan.gtsp.gtsplib import read_text
 from pushplan.gtsp.instance import GtspInstance
 from pushplan.world.checks import integer
 
+_LONGEST_WHOLE = 1e15
+"""Whole numbers below this are written without a decimal point, as other programs read them."""
+
 
 def write_gtsp(path: str | Path, instance: GtspInstance) -> None:
     """Write an instance so that `read_gtsp` gives the same one.
@@ -110,7 +113,9 @@ def read_tour(path: str | Path) -> tuple[int, ...]:
 
 def _text(value: float) -> str:
     number = float(value)
-    return str(int(number)) if number.is_integer() and abs(number) < 1e15 else repr(number)
+    if number.is_integer() and abs(number) < _LONGEST_WHOLE:
+        return str(int(number))
+    return repr(number)
 
 
 def _write(path: str | Path, lines: Iterable[str]) -> None:

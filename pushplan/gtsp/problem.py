@@ -40,7 +40,9 @@ class Problem:
     def reduced(self) -> Problem:
         """The same without nodes that another one of their cluster can always stand for."""
         needed = needed_nodes(self.costs, self.offsets)
-        return self if len(needed) == len(self.costs) else self.only(needed)
+        if len(needed) == len(self.costs):
+            return self
+        return self.only(needed)
 
     def only(self, kept: IntArray) -> Problem:
         """The same with some nodes, (k,) ascending, at least one of each cluster."""
@@ -113,7 +115,9 @@ class Problem:
     @cached_property
     def onto(self) -> FloatArray:
         """(m, N) cheapest arc from each node to each cluster."""
-        return self.into if self.symmetric else _cheapest(self.reverse, self.offsets)
+        if self.symmetric:
+            return self.into
+        return _cheapest(self.reverse, self.offsets)
 
     @cached_property
     def symmetric(self) -> bool:
@@ -151,7 +155,9 @@ def tour_cost(costs: NDArray[np.number], nodes: IntArray) -> float:
     if len(nodes) < 2:
         return 0.0
     arcs = costs[nodes, np.append(nodes[1:], nodes[0])]
-    return math.inf if np.isinf(arcs).any() else math.fsum(arcs.tolist())
+    if np.isinf(arcs).any():
+        return math.inf
+    return math.fsum(arcs.tolist())
 
 
 def _cheapest(wide: FloatArray, offsets: IntArray) -> FloatArray:

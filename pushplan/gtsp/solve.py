@@ -79,7 +79,9 @@ def solve_gtsp(
     seed = (np.random.default_rng(0) if rng is None else rng).integers(1, 2**63, 1)
     call = _SolverCall(matrix, members, seed.astype(np.uint64), budget, stop, config)
     tour = call.solve()
-    return replace(tour, nodes=tuple(names[node] for node in tour.nodes)) if names else tour
+    if names:
+        tour = replace(tour, nodes=tuple(names[node] for node in tour.nodes))
+    return tour
 
 
 @dataclass
@@ -146,8 +148,9 @@ class _SolverCall:
         if config.method == "exact" or problem.count <= 3:
             return True
         fits = need <= config.memory_mb and problem.count - 1 <= config.exact_clusters
-        timed = budget.seconds < math.inf
-        left = EXACT_FRACTION * budget.seconds - budget.elapsed if timed else UNTIMED_S
+        left = UNTIMED_S
+        if budget.seconds < math.inf:
+            left = EXACT_FRACTION * budget.seconds - budget.elapsed
         return config.method == "auto" and fits and expected_seconds(problem) < left
 
     def _search(self, problem: Problem, everything: list[IntArray] | None = None) -> Tour:

@@ -137,7 +137,9 @@ class Walks:
             norm = float(slope @ slope)
             if self.bound > self.limit or norm == 0.0 or not np.isfinite(value):
                 break
-            goal = self.goal if np.isfinite(self.goal) else value + abs(value) + self.margin
+            goal = self.goal
+            if not np.isfinite(goal):  # no tour is known: aim well above the bound
+                goal = value + abs(value) + self.margin
             self.prices = self.prices + scale * max(goal - value, 0.0) / norm * slope
         self.prices = best
 

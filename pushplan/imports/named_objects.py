@@ -39,7 +39,10 @@ def load_object(spec: str) -> Any:
     if where.count(".") >= _DEEPEST:
         raise InvalidInputError(f"a module has at most {_DEEPEST} parts in its name, got {spec!r}")
     with _fresh_modules():
-        module = _load_file(Path(where)) if where.endswith(".py") else _load_module(where, spec)
+        if where.endswith(".py"):
+            module = _load_file(Path(where))
+        else:
+            module = _load_module(where, spec)
     if not hasattr(module, name):
         shown = Path(where).name if where.endswith(".py") else where
         raise InvalidInputError(
@@ -89,7 +92,9 @@ def _fresh_modules() -> Iterator[None]:
         yield
     finally:
         for name, module in [*sys.modules.items()]:
-            file = getattr(module, "__file__", None) if module is not before.get(name) else None
+            if module is before.get(name):
+                continue
+            file = getattr(module, "__file__", None)
             if isinstance(file, str) and is_a_users(file):
                 _imported[name] = file, _version(file)
 

@@ -52,8 +52,9 @@ def need(module: str) -> Any:
 
 def missing(error: BaseException) -> MissingDependencyError | None:
     """Our error in place of one about a missing library of an extra; None for others."""
-    name = error.name if isinstance(error, ModuleNotFoundError) else None
-    library = (name or "").partition(".")[0]
+    if not isinstance(error, ModuleNotFoundError):
+        return None
+    library = (error.name or "").partition(".")[0]
     if library not in EXTRAS:
         return None
     return MissingDependencyError(
@@ -104,7 +105,9 @@ class Registered(MutableMapping[str, str]):
         return self._known
 
     def __getitem__(self, name: str) -> str:
-        return self._known[name] if name in self._known else self._all()[name]
+        if name in self._known:  # our own names need no search of what is installed
+            return self._known[name]
+        return self._all()[name]
 
     def __setitem__(self, name: str, value: str) -> None:
         self._known[name] = value

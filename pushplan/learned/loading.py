@@ -84,7 +84,9 @@ def learned_file(source: str) -> Path:
     if not name:
         raise InvalidInputError(f"policy {source!r}: the file is missing, as in {kind}:FILE")
     path = Path(name).expanduser()
-    with_ending = path.with_name(path.name + _ENDINGS[kind]) if path.name else path
+    with_ending = path
+    if path.name:  # "/" and "." have none
+        with_ending = path.with_name(path.name + _ENDINGS[kind])
     for candidate in (path, with_ending):
         if candidate.is_file():
             return candidate.resolve()

@@ -136,7 +136,9 @@ class NetworkPolicy:
             BadOutputError: if the network gives something that is no action.
         """
         if not self._ahead:
-            seen = self.observation.observe(world) if observation is None else observation
+            seen = observation
+            if seen is None:
+                seen = self.observation.observe(world)
             self._check(seen)
             try:
                 actions = self._decide(world, seen)

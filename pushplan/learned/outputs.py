@@ -105,7 +105,10 @@ class ActionSpec(CheckedFields):
         if self.output in CHOOSING:
             return self.chosen(self.choose(output))
         actions = np.clip(self._checked(output), -1.0, 1.0).astype(np.float32)
-        return actions[: self.repeat] if self.output == "chunk" else self._held(actions)
+        if self.output == "chunk":
+            chunk: NDArray[np.float32] = actions[: self.repeat]
+            return chunk
+        return self._held(actions)
 
     def choose(self, output: ArrayLike, tried: Collection[Any] = ()) -> Any:
         """The best pixel of ``pixel_values`` or the angle of a ``direction``.

@@ -81,7 +81,9 @@ def attach(path: str | Path, specification: Specification) -> None:
 
 def _zip(path: str | Path) -> Path:
     path = Path(path)
-    return path if path.suffix == ".zip" else path.with_name(f"{path.name}.zip")
+    if path.suffix == ".zip":
+        return path
+    return path.with_name(f"{path.name}.zip")  # as Stable-Baselines3 appends it
 
 
 def _text(specification: Specification) -> str:

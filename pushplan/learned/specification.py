@@ -113,12 +113,14 @@ class Specification(CheckedFields):
         known_keys("the specification", data, _KEYS, tuple(k for k in _KEYS if k != "training"))
         training = data.get("training", {})
         robot = data["robot"]
+        if robot is not None:
+            robot = from_mapping(RobotSpec, "robot", robot)
         if not isinstance(training, dict):
             raise SchemaError(f"training must be a mapping, got {training!r:.60}")
         return cls(
             tasks=data["tasks"],
             presets=data["presets"],
-            robot=None if robot is None else from_mapping(RobotSpec, "robot", robot),
+            robot=robot,
             control_step=data["control_step"],
             observation=builder_from_dict(data["observation"]),
             action=from_mapping(ActionSpec, "action", data["action"]),

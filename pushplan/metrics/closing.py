@@ -38,7 +38,9 @@ def made_unsolvable(episode: Episode) -> float | None:
         return None
     if not suits_keyholes(world, _CONFIG) or not _solvable(episode.world_at(0)):
         return None
-    return 0.0 if episode.success or _solvable(episode.world_at(-1)) else 1.0
+    if episode.success or _solvable(episode.world_at(-1)):
+        return 0.0
+    return 1.0
 
 
 @lru_cache(maxsize=64)

@@ -121,12 +121,15 @@ def spanning_tree_length(static: StaticMap | None, points: list[FloatArray]) -> 
 
     Edges are shortest paths of a point around what is static, straight lines without a map.
     """
-    walled = static is not None and (len(static.polygons) or len(static.segments))
-    paths = VisibilityGraph(static) if static is not None and walled else None
+    paths = None
+    if static is not None and not static.is_empty:
+        paths = VisibilityGraph(static)
     graph: nx.Graph[int] = nx.empty_graph(len(points))
     for k, a in enumerate(points):
         for j, b in enumerate(points[:k]):
-            length = math.dist(a, b) if paths is None else paths.shortest_path(a, b).length
+            length = math.dist(a, b)
+            if paths is not None:
+                length = paths.shortest_path(a, b).length
             graph.add_edge(j, k, weight=length)
     tree = nx.minimum_spanning_edges(graph, algorithm="prim")
     return float(sum(edge["weight"] for _, _, edge in tree))

@@ -74,7 +74,9 @@ def shortest_length(
     choice("clearance", clearance, ("robot", "point"))
     world = episode.world
     goal = world.navigation_goal
-    radius = world.robot.inscribed_radius if clearance == "robot" else 0.0
+    radius = 0.0
+    if clearance == "robot":
+        radius = world.robot.inscribed_radius
     graph = VisibilityGraph(world.static, clearance=radius)
     start = episode.robot_poses[0, :2]
     if to_goal_point and isinstance(goal, GoalDisc):
@@ -109,7 +111,9 @@ def e_nav(episode: Episode) -> float:
 
 def e_nav_to_goal_point(episode: Episode) -> float:
     """E_nav with l_0* measured to the goal's centre, to be set beside the paper's tables."""
-    return navigation_scores(episode, to_goal_point=True).efficiency if episode.success else 0.0
+    if not episode.success:
+        return 0.0
+    return navigation_scores(episode, to_goal_point=True).efficiency
 
 
 def i_nav(episode: Episode) -> float:

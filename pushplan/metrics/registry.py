@@ -11,7 +11,7 @@ from typing import Literal, cast
 from pushplan.errors import describe, short
 from pushplan.imports.named_objects import load_object
 from pushplan.imports.on_demand import Registered
-from pushplan.world import ClearanceArea, Episode, InvalidInputError, Receptacle, UnknownNameError
+from pushplan.world import Episode, InvalidInputError, UnknownNameError
 
 GoalKind = Literal["robot", "objects"]
 
@@ -129,7 +129,7 @@ def compute(episode: Episode, names: Iterable[str] | None = None) -> Mapping[str
         UnknownNameError: if there is no such metric.
         InvalidInputError: if a metric returns something that is no number.
     """
-    kind = "objects" if isinstance(episode.world.goal, Receptacle | ClearanceArea) else "robot"
+    kind = episode.world.goal_kind
     values: dict[str, float] = {}
     for name in METRICS if names is None else names:
         function = metric_function(name)
@@ -169,7 +169,9 @@ def metric_function(name: str) -> Callable[[Episode], float | None]:
     except MemoryError:
         raise
     except (Exception, SystemExit) as error:  # whatever a user's file raises
-        said = error if isinstance(error, InvalidInputError) else describe(error)
+        said = describe(error)
+        if isinstance(error, InvalidInputError):
+            said = str(error)
         raise InvalidInputError(f"cannot load metric {name!r}: {said}") from error
     if not callable(function):
         raise InvalidInputError(f"metric {name!r} is no function, but {short(function)}")

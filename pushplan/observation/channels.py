@@ -155,7 +155,7 @@ def robot_distance(image: Image, view: View) -> None:
         view.rows, view.cols, view.step_up, view.step_across, *_eye(view), per_metre
     )
     static_map = view.world.static
-    if len(static_map.polygons) or len(static_map.segments):
+    if not static_map.is_empty:
         fill_hidden(image, view, bend_distances(static_map, view.finest), per_metre)
         _fill_static(image, view)
 

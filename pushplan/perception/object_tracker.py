@@ -128,9 +128,11 @@ class ObjectTracker:
         stamp = number("stamp", stamp)
         if isinstance(polygons, str) or not isinstance(polygons, Sequence | np.ndarray):
             raise InvalidInputError(f"polygons must be a list of outlines, got {polygons!r:.60}")
-        labels = None if ids is None else array("ids", ids, (len(polygons),), dtype=np.int64)
-        if labels is not None and len(np.unique(labels)) != len(labels):
-            raise InvalidInputError(f"ids must be distinct, got {labels.tolist()}")
+        labels = None
+        if ids is not None:
+            labels = array("ids", ids, (len(polygons),), dtype=np.int64)
+            if len(np.unique(labels)) != len(labels):
+                raise InvalidInputError(f"ids must be distinct, got {labels.tolist()}")
         points = [array(f"polygons[{i}]", p, (None, 2)) for i, p in enumerate(polygons)]
         if self.time is not None and stamp <= self.time:
             self.ignored += 1
@@ -225,7 +227,9 @@ class ObjectTracker:
 
     def _add(self, sighting: Sighting) -> None:
         assert self.time is not None
-        label = self._next if sighting.label is None else int(sighting.label)
+        label = self._next
+        if sighting.label is not None:
+            label = int(sighting.label)
         self._next = max(self._next, label) + 1
         self._tracks.append(Track(label, sighting, self.time, self._accelerations))
 

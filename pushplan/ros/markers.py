@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pushplan.ros.ros_messages import Messages
-from pushplan.world import ClearanceArea, GoalDisc, Receptacle, World
+from pushplan.world import GoalDisc, ManipulationGoal, World
 from pushplan.world.checks import FloatArray
 
 # of visualization_msgs/Marker: type, and actions
@@ -30,7 +30,7 @@ def scene_markers(messages: Messages, world: World) -> Any:
     area: list[FloatArray] = []
     if isinstance(goal, GoalDisc):
         area = [goal.center + goal.radius * np.stack([np.cos(_CIRCLE), np.sin(_CIRCLE)], axis=1)]
-    elif isinstance(goal, Receptacle | ClearanceArea):
+    elif isinstance(goal, ManipulationGoal):
         area = [goal.polygon]
     base = messages.base_frame
     frame = messages.frame_id

@@ -24,7 +24,7 @@ from pushplan.ros.mcap_writer import (
     McapWriter,
 )
 from pushplan.ros.message_types import RosbagsTypes
-from pushplan.world import ClearanceArea, Episode, Receptacle, SchemaError
+from pushplan.world import Episode, SchemaError
 from pushplan.world.checks import FloatArray
 from pushplan.world.stored.world_files import world_from_dict
 
@@ -157,13 +157,12 @@ def _episode(logged: Mapping[str, list[Any]]) -> Episode:
     dropped = [int(one["notes"]) for one in logged[DROPPED]]
     last = world.moved(robot_pose=recorded["robot_poses"][-1], movable_poses=poses[-1])
     ended = commands[-1].status if commands else "no command"
-    moves_objects = isinstance(world.goal, Receptacle | ClearanceArea)
     return Episode(
         world=world,
         **recorded,
         success=last.goal_reached,
         reason="goal" if last.goal_reached else ended,
-        completed=last.completed if moves_objects else None,
+        completed=last.completed if world.goal_kind == "objects" else None,
         actions=np.reshape([[one.linear, one.angular] for one in commands], (-1, 2)),
         about={"source": "a robot's log", "dropped": sum(dropped)},
     )

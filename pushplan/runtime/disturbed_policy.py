@@ -14,8 +14,9 @@ from pushplan.control import SimulatedExecutor, clamp_twist
 from pushplan.control.limits import driven_twist
 from pushplan.runtime.disturbances import Disturbances
 from pushplan.runtime.runner import Runner
-from pushplan.world import ChoosesActions, Planner, Policy, Twist, World
+from pushplan.world import Planner, Policy, Twist, World
 from pushplan.world.checks import BoolArray, FloatArray, number
+from pushplan.world.policy_abilities import action_modes
 
 
 class DisturbedPolicy:
@@ -56,8 +57,7 @@ class DisturbedPolicy:
         self._period = period
         self._planning_time = planning_time
         driven = self._make().policy
-        given = driven.actions if isinstance(driven, ChoosesActions) else ()
-        self.actions = tuple(given) or ("velocity", "turn_rate")
+        self.actions = action_modes(driven) or ("velocity", "turn_rate")
         self.runner: Runner | None = None
 
     def _make(self) -> Runner:
@@ -115,8 +115,10 @@ class DisturbedPolicy:
         passed = world.time - self._seen_at
         self._seen_at = world.time
         if d.loss > 0.0:  # a chain with two states: mean length of a burst, and fraction lost
-            again = 1.0 - 1.0 / d.burst if self._lost else d.loss / (d.burst * (1.0 - d.loss))
-            self._lost = bool(rng.random() < again)
+            chance = d.loss / (d.burst * (1.0 - d.loss))
+            if self._lost:
+                chance = 1.0 - 1.0 / d.burst
+            self._lost = bool(rng.random() < chance)
         seen = self._noisy(world, self._visible(world, passed))
         if not self._lost:
             self._inbox.append((world.time + d.delay, seen))

@@ -22,6 +22,7 @@ from pushplan.world import (
     WheelSpeeds,
     World,
 )
+from pushplan.world.policy_abilities import action_modes
 
 _TWISTS = ("velocity", "turn_rate")
 _MODES = (*_TWISTS, "wheels")
@@ -42,8 +43,7 @@ class HeldActions:
         check_world_policy(policy)
         self._policy = policy
         self._hold = hold
-        given = policy.actions if isinstance(policy, ChoosesActions) else ()
-        self.actions = tuple(mode for mode in given if mode in _TWISTS) or _TWISTS
+        self.actions = tuple(mode for mode in action_modes(policy) if mode in _TWISTS) or _TWISTS
         self.plan_with(ImmediateExecutor())
 
     def plan_with(self, executor: PlanningExecutor) -> None:
@@ -139,4 +139,6 @@ def drivable(policy: object, hold: float) -> Any:
             "policy must be a policy (reset and act), a planner (plan) or a name, "
             f"got {type(policy).__name__}"
         )
-    return policy if isinstance(policy, PlansBesideDriving) else HeldActions(policy, hold)
+    if isinstance(policy, PlansBesideDriving):
+        return policy
+    return HeldActions(policy, hold)

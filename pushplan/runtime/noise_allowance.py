@@ -74,7 +74,9 @@ class NoiseAllowance:
         margin = self.margin
         if margin is None:
             margin = max(world.margin, self.noise_margin(world.robot))
-        return world if margin == world.margin else replace(world, margin=margin)
+        if margin == world.margin:
+            return world
+        return replace(world, margin=margin)
 
 
 @functools.lru_cache(maxsize=8)

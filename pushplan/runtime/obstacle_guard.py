@@ -110,8 +110,9 @@ class ObstacleGuard:
                 if closeness.allows(path):
                     self._stands = False
                     self._side = side
-                    reason = "" if fraction == 1.0 else _reason(world, near, "slows down")
-                    return slower, reason
+                    if fraction == 1.0:
+                        return slower, ""
+                    return slower, _reason(world, near, "slows down")
         rest = waiting_twist(world.with_fixed_as_static())
         turn = self._side * robot.max_turn_rate or rest.angular
         self._stands = robot.can_stop

@@ -42,6 +42,7 @@ from pushplan.world import (
     World,
 )
 from pushplan.world.checks import choice, expect, number
+from pushplan.world.policy_abilities import shown_plan
 
 PLAN_STOP = OwnBudget() | Deadline(1.0)
 """Stop rule of planning calls: the planner's own budget, and never more than a second."""
@@ -125,7 +126,9 @@ class Runner:
         self.plan_stop = expect("plan_stop", plan_stop, Stop)  # type: ignore[type-abstract]
         self.max_age = number("max_age", max_age, low=0.0, open_low=True)
         self.on_stale = choice("on_stale", on_stale, ("stop", "continue"))
-        self.margin = None if margin is None else number("margin", margin, low=0.0)
+        if margin is not None:
+            margin = number("margin", margin, low=0.0)
+        self.margin = margin
         self.keep_unseen = number("keep_unseen", keep_unseen, low=0.0)
         delay = number("delay", delay, low=0.0)
         noise = [
@@ -216,7 +219,10 @@ class Runner:
     def _observe(self, world: World) -> None:
         """Take a snapshot, and see whether it is sure by now that the goal is reached."""
         seen = self._estimator.observe(world)
-        self._done = self._done + 1 if seen.goal_reached else max(0, self._done - 1)
+        if seen.goal_reached:
+            self._done += 1
+        else:
+            self._done = max(0, self._done - 1)
         exact = isinstance(world.goal, GoalDisc | GoalLine) and not self._allowance.is_noisy
         once = exact or not world.robot.can_stop  # one that drives on may be out soon
         self._surely_done = self._surely_done or self._done >= (1 if once else _SURE)
@@ -243,7 +249,9 @@ class Runner:
         """
         world = self._allowance.planning_world(world)
         with self._lock:
-            newest = math.inf if self._newest is None else self._newest.time - self._shift
+            newest = math.inf
+            if self._newest is not None:
+                newest = self._newest.time - self._shift
             behind = [time - world.time for time in (newest, *(one.time for one in self._inbox))]
             superseded = any(0.0 <= t <= self.max_age for t in behind)
             news = world.time > newest and not superseded
@@ -266,7 +274,9 @@ class Runner:
                 stamp = world.time + self._shift
                 if self._newest.time < stamp <= now + self.max_age:
                     seen_at = min(stamp, now)
-                    fresh.append(world if seen_at == world.time else world.moved(time=seen_at))
+                    if seen_at != world.time:
+                        world = world.moved(time=seen_at)
+                    fresh.append(world)
                     continue
                 side = "ahead of" if stamp > now else "behind"
                 off = f"{abs(stamp - now):.3g} s {side}"
@@ -310,7 +320,9 @@ class Runner:
         if self._prompt:
             take_usual_turns()
             self._prompt = False
-        return self._executor.close(timeout) if isinstance(self._executor, ThreadExecutor) else True
+        if isinstance(self._executor, ThreadExecutor):
+            return self._executor.close(timeout)
+        return True
 
     def command(self, now: float) -> Command:
         """Return the command to drive now; never plans, never waits.
@@ -345,7 +357,7 @@ class Runner:
             status = CommandStatus.BLOCKED
             reason = obstacle
         self._estimator.sent(at, twist)
-        plan = self.policy.current_plan if isinstance(self.policy, ShowsPlan) else None
+        plan = shown_plan(self.policy)
         if plan is not self._plan:
             self._plan = plan
             self._planned_at = at
@@ -435,8 +447,10 @@ class Runner:
             self._drop_plans()
             return None, CommandStatus.FAILED, self._failure
         if wanted.linear == 0.0 == wanted.angular:
-            why = "a plan is on its way" if self._running_s else _missing_plan(self.policy)
-            return wanted, CommandStatus.WAITING, why or "the policy asks for no motion"
+            why = "a plan is on its way"
+            if not self._running_s:
+                why = _missing_plan(self.policy) or "the policy asks for no motion"
+            return wanted, CommandStatus.WAITING, why
         return wanted, CommandStatus.DRIVING, ""
 
     @property
@@ -447,8 +461,9 @@ class Runner:
     @property
     def _running_s(self) -> float:
         """For how long a planning call has been running [s]; 0 if none is."""
-        executor = self._executor
-        return executor.running_s if isinstance(executor, ThreadExecutor) else 0.0
+        if isinstance(self._executor, ThreadExecutor):
+            return self._executor.running_s
+        return 0.0
 
 
 def _missing_plan(policy: Policy) -> str:
@@ -458,4 +473,6 @@ def _missing_plan(policy: Policy) -> str:
     if policy.current_plan is not None or not policy.plan_log:
         return ""
     status = policy.plan_log[-1].status
-    return "" if status.has_plan else f"{status.label}: {status.remedy}"
+    if status.has_plan:
+        return ""
+    return f"{status.label}: {status.remedy}"

@@ -12,7 +12,7 @@ import numpy as np
 
 from pushplan.control.stopping import add_arc
 from pushplan.interaction.path_sweepers import default_interaction
-from pushplan.world import ClearanceArea, Receptacle, Twist, World
+from pushplan.world import Twist, World
 from pushplan.world.checks import FloatArray
 
 _REACH = 1.1  # what is farther from the robot's path than this many radii is not moved
@@ -78,7 +78,9 @@ class StateEstimator:
         end = min(time, self._world.time + self._horizon)
         if end > self._ahead.time:
             self._ahead = self._advanced(self._ahead, end)
-        return self._ahead if self._ahead.time == time else self._ahead.moved(time=time)
+        if self._ahead.time == time:
+            return self._ahead
+        return self._ahead.moved(time=time)
 
     def _advanced(self, world: World, time: float) -> World:
         if time <= world.time:
@@ -173,7 +175,7 @@ class ObjectMemory:
         seen_at = dict.fromkeys(seen.movables.ids.tolist(), seen.time)
         if self._keep > 0.0:
             done = np.zeros(len(predicted.movables), dtype=np.bool_)
-            if isinstance(predicted.goal, Receptacle | ClearanceArea):
+            if predicted.goal_kind == "objects":
                 done = predicted.completed
             kept = []
             for k, label in enumerate(predicted.movables.ids.tolist()):

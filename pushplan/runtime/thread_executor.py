@@ -180,7 +180,9 @@ class ThreadCall(Generic[T]):
         """
         if self._done:
             return self._result  # type: ignore[return-value]
-        why = "it was abandoned" if self._error is None else describe(self._error)
+        why = "it was abandoned"
+        if self._error is not None:
+            why = describe(self._error)
         raise PlanningError(f"planning failed: {why}") from self._error
 
     def abandon(self) -> None:

@@ -111,11 +111,13 @@ def _pack(
         if reached >= wanted:
             return IceField(_shrunk(floes, wanted / reached), box)
         best = max(best, reached)
+    reached_words = ""
+    if best:
+        reached_words = f": {concentration * best / wanted:.3g} was reached"
     raise ScenarioError(
         f"a concentration of {concentration:.3g} cannot be packed with floes of {sizes.least:g} to "
-        f"{sizes.greatest:g} m radius and gaps of {water.gap:g} m"
-        + (f": {concentration * best / wanted:.3g} was reached" if best else "")
-        + "; ask for less ice, smaller gaps or a wider range of sizes"
+        f"{sizes.greatest:g} m radius and gaps of {water.gap:g} m{reached_words}; "
+        "ask for less ice, smaller gaps or a wider range of sizes"
     )
 
 

@@ -116,11 +116,9 @@ def suite(name: str, *, episodes: int | None = None, first_seed: int = 0) -> Sui
     if not isinstance(name, str) or name not in table:
         raise UnknownNameError("suite", name, table)
     entry = table[name]
-    count = (
-        entry["episodes"]
-        if episodes is None
-        else integer("episodes", episodes, low=1, high=MOST_EPISODES)
-    )
+    count = entry["episodes"]
+    if episodes is not None:
+        count = integer("episodes", episodes, low=1, high=MOST_EPISODES)
     first = integer("first_seed", first_seed, low=0)
     starts = [Scenario.from_dict(start) for start in entry["starts"]]
     scenarios = tuple(

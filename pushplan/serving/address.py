@@ -53,7 +53,9 @@ class Address:
         found = _TCP.fullmatch(text)
         if found is None or int(found[2]) > 65535:
             raise InvalidInputError(f"a socket is {_FORMS} (PORT up to 65535), got {short(text)}")
-        host = "127.0.0.1" if found[1] == "localhost" else found[1].strip("[]")
+        host = found[1].strip("[]")
+        if host == "localhost":
+            host = "127.0.0.1"
         if not allow_remote and not _is_loopback(host):
             raise InvalidInputError(
                 f"{short(host)} can be reached from other machines, and the server asks nobody who "
@@ -84,7 +86,9 @@ class Address:
             dual = six and socket.has_dualstack_ipv6()  # [::] stands for IPv4, too
             return socket.create_server((self.host, self.port), family=family, dualstack_ipv6=dual)
         except OSError as error:
-            why = "the path is too long" if "too long" in str(error) else error.strerror or error
+            why: object = error.strerror or error
+            if "too long" in str(error):
+                why = "the path is too long"
             raise InvalidInputError(f"cannot listen at {self}: {why}") from error
 
     def _listen_at_path(self) -> socket.socket:

@@ -17,8 +17,9 @@ from pushplan.serving import messages
 from pushplan.serving.connection import ServerLimits
 from pushplan.serving.episodes import LoopEpisode, StepEpisode, check_settings
 from pushplan.serving.world_feed import WorldFeed
-from pushplan.world import ChoosesActions, InvalidInputError, Policy, PushplanError, World
+from pushplan.world import InvalidInputError, Policy, PushplanError, World
 from pushplan.world.checks import boolean, integer, number, word
+from pushplan.world.policy_abilities import action_modes
 from pushplan.world.stored.world_files import SCHEMA
 
 LOG = logging.getLogger("pushplan.serving")
@@ -129,7 +130,7 @@ class Session:
             "protocol": messages.PROTOCOL,
             "version": __version__,
             "policy": self._label,
-            "actions": list(policy.actions) if isinstance(policy, ChoosesActions) else [],
+            "actions": list(action_modes(policy)),
             "goals": list(goals),
             "world_schema": SCHEMA,
             "period": period,

@@ -108,7 +108,9 @@ class WorldFeed:
             if "ids" in message or "twists" in message:
                 raise SchemaError("'ids' and 'twists' need 'poses', one [x, y, theta] for each")
             return last
-        objects = self._chosen(message["ids"]) if "ids" in message else self._known
+        objects = self._known
+        if "ids" in message:
+            objects = self._chosen(message["ids"])
         rows: dict[str, FloatArray] = {}
         for name in ("poses", "twists"):
             if name not in message:

@@ -34,6 +34,13 @@ SPACING = 0.05
 """Between the poses of a voyage, in hull lengths."""
 STEEPEST = math.radians(75.0)
 """Greatest angle between the ship and the channel [rad]."""
+ALONG = 0.3
+"""Angle to the channel below which a ship near a side turns to the middle, else to the channel
+[rad]."""
+STRAIGHT_FRACTION = 0.25
+"""Fraction of the arcs that are straight."""
+LONGEST_VOYAGE = 4000
+"""Most poses of a voyage, which may never get to the end of the channel."""
 
 
 @dataclass(frozen=True)
@@ -64,12 +71,15 @@ def random_voyage(world: World, rng: np.random.Generator) -> FloatArray:
     x_low, _, x_high, y_high = world.static.bounds.tolist()
     x, y, theta = world.robot_pose.tolist()
     poses = [(x, y, theta)]
-    while y < y_high - 1.5 * length and len(poses) < 4000:
-        straight = rng.random() < 0.25
-        curvature = 0.0 if straight else rng.choice([-1.0, 1.0]) * tightest * rng.uniform(0.1, 1.0)
+    while y < y_high - 1.5 * length and len(poses) < LONGEST_VOYAGE:
+        curvature = 0.0
+        if rng.random() >= STRAIGHT_FRACTION:
+            curvature = rng.choice([-1.0, 1.0]) * tightest * rng.uniform(0.1, 1.0)
         off = theta - 0.5 * math.pi
         if abs(off) > STEEPEST or x < x_low + length or x > x_high - length:
-            wanted = math.copysign(1.0, 0.5 * (x_low + x_high) - x) if abs(off) < 0.3 else off
+            wanted = off
+            if abs(off) < ALONG:
+                wanted = 0.5 * (x_low + x_high) - x
             curvature = -math.copysign(tightest, wanted)
         for _ in range(max(1, round(rng.uniform(*ARCS) * length / step))):
             middle = theta + 0.5 * curvature * step
@@ -77,7 +87,8 @@ def random_voyage(world: World, rng: np.random.Generator) -> FloatArray:
             y += step * math.sin(middle)
             theta += curvature * step
             poses.append((x, y, theta))
-            if abs(theta - 0.5 * math.pi) > STEEPEST and curvature * (theta - 1.57) > 0.0:
+            off = theta - 0.5 * math.pi
+            if abs(off) > STEEPEST and curvature * off > 0.0:
                 break
     return np.array(poses)
 
@@ -126,7 +137,9 @@ def _choose(
     rng: np.random.Generator,
 ) -> tuple[list[Passage], list[tuple[int, int]]]:
     """Pieces of a voyage, from the poses with the first number to those with the second."""
-    last = len(voyage) - 1 if moved.jammed_at < 0 else moved.jammed_at - 1
+    last = len(voyage) - 1
+    if moved.jammed_at >= 0:
+        last = moved.jammed_at - 1
     shortest, longest = (max(1, round(fraction / SPACING)) for fraction in (SHORTEST, LONGEST))
     passages = []
     ends = []

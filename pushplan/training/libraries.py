@@ -37,7 +37,9 @@ def hardware(device: str) -> str:
 
     torch = need("torch")
     words = f"{os.cpu_count()}-core {platform.machine()} machine"
-    return f"{words}, {torch.cuda.get_device_name()}" if device != "cpu" else words
+    if device == "cpu":
+        return words
+    return f"{words}, {torch.cuda.get_device_name()}"
 
 
 def parameter_count(network: Any) -> int:

@@ -138,8 +138,10 @@ def _check(base: Any, note: Any) -> Callable[..., Any] | None:
         bool: boolean,
         str: word,
         int: partial(integer, low=note.low, high=note.high),
-        float: number if note == Limits() else partial(number, **vars(note)),
+        float: number,
     }
+    if note != Limits():
+        plain[float] = partial(number, **vars(note))
     return plain.get(base)
 
 
@@ -147,9 +149,10 @@ def _entries(
     name: str, value: object, *, kind: Any, check: Any, least: int, most: float
 ) -> tuple[Any, ...]:
     """The checked entries of a list, from ``least`` to ``most`` of them."""
-    entries = value if isinstance(value, Sequence) and not isinstance(value, str) else None
-    if entries is None or not least <= len(entries) <= most:
-        count = f"{least} " if least == most else "one or more " if least else ""
+    if isinstance(value, str) or not isinstance(value, Sequence) or not least <= len(value) <= most:
+        count = "one or more " if least else ""
+        if least == most:
+            count = f"{least} "
         noun = "names" if kind is str else "numbers"
         raise InvalidInputError(f"{name} must be a list of {count}{noun}, got {short(value)}")
-    return tuple(check(f"{name}[{i}]", one) for i, one in enumerate(entries))
+    return tuple(check(f"{name}[{i}]", one) for i, one in enumerate(value))

@@ -74,7 +74,9 @@ def integer(name: str, value: object, *, low: float = -math.inf, high: float = m
         raise InvalidInputError(f"{name} must be a whole number, got {short(value)}")
     result = int(value)
     if not low <= result <= high:
-        limits = f"at least {low}" if high == math.inf else f"in [{low}, {high}]"
+        limits = f"in [{low}, {high}]"
+        if high == math.inf:
+            limits = f"at least {low}"
         raise InvalidInputError(f"{name} must be {limits}, got {short(result)}")
     return result
 

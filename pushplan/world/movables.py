@@ -233,15 +233,12 @@ class Movables(ArrayRecord, CheckedFields):
 
         Outlines are not checked again, so this is cheap enough for every control step.
         """
-        count = len(self)
-        still = frozen(np.zeros((count, 3)))
-        return self._unchecked(
-            {
-                **self.__dict__,
-                "poses": array("poses", poses, (count, 3)),
-                "twists": still if twists is None else array("twists", twists, (count, 3)),
-            }
-        )
+        shape = (len(self), 3)
+        moved = array("poses", poses, shape)
+        velocities = frozen(np.zeros(shape))
+        if twists is not None:
+            velocities = array("twists", twists, shape)
+        return self._unchecked({**self.__dict__, "poses": moved, "twists": velocities})
 
     def holding_fixed(self, fixed: ArrayLike) -> Movables:
         """The same objects, of which those flagged in (K,) are held not to move."""

@@ -86,7 +86,9 @@ def occupancy_polygons(
 
 def _placed(origin: FloatArray, points: FloatArray) -> FloatArray:
     """Points of the grid (N, 2) [m] in the world frame, exact where it is not rotated."""
-    return points + origin[:2] if origin[2] == 0.0 else transform(origin, points)
+    if origin[2] == 0.0:
+        return points + origin[:2]
+    return transform(origin, points)
 
 
 def _triangles(rim: FloatArray, box: FloatArray) -> list[FloatArray]:

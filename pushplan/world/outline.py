@@ -196,11 +196,11 @@ def convex_outlines(name: str, outlines: Sequence[ArrayLike]) -> list[FloatArray
         else:
             points.append(array(f"{name} {i}", outline, (None, 2)))
     vertices, offsets = flatten(points)
+    found = list(unflatten(vertices, offsets))
     good = well_formed(vertices, offsets)  # no if not finite
-    return [
-        corners if good[i] else convex_outline(f"{name} {i}", corners)
-        for i, corners in enumerate(unflatten(vertices, offsets))
-    ]
+    for i in np.flatnonzero(np.logical_not(good)).tolist():
+        found[i] = convex_outline(f"{name} {i}", found[i])
+    return found
 
 
 def well_formed(vertices: FloatArray, offsets: IntArray) -> BoolArray:

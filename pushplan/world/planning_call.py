@@ -38,8 +38,9 @@ class PlanningCall:
         own = wants_own_budget(given)
         self.has_rule = not own
         """True if a rule of the caller takes the place of the planner's own budget."""
-        rules = [rule for rule in (given, default if own else None) if rule is not None]
-        self._rule = AnyOf(tuple(rules)) if len(rules) > 1 else rules[0] if rules else None
+        self._rule = given
+        if own and default is not None:  # a rule that only cancels leaves the planner its budget
+            self._rule = default if given is None else AnyOf((given, default))
         self.arm()
 
     def arm(self) -> None:
@@ -59,7 +60,9 @@ class PlanningCall:
     @property
     def stopped_status(self) -> PlanStatus:
         """The status of a call that was stopped before there was a plan."""
-        return PlanStatus.CANCELLED if self.cancelled else PlanStatus.TIMED_OUT
+        if self.cancelled:
+            return PlanStatus.CANCELLED
+        return PlanStatus.TIMED_OUT
 
     def result(
         self,

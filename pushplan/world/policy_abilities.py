@@ -72,6 +72,13 @@ class ChoosesActions(Protocol):
         """Names of action modes, the preferred one first; the first that the task has is taken."""
 
 
+def action_modes(policy: object) -> tuple[str, ...]:
+    """The action modes that a policy names, the preferred one first; none where it names none."""
+    if isinstance(policy, ChoosesActions):
+        return tuple(policy.actions)
+    return ()
+
+
 @runtime_checkable
 class ChoosesObservation(Protocol):
     """Decides on what the environment observes; a policy without it looks at the `World` alone."""
@@ -156,6 +163,13 @@ class ShowsPlan(Protocol):
     @property
     def current_plan(self) -> Plan | None:
         """The plan that is being driven; None while there is none."""
+
+
+def shown_plan(policy: object) -> Plan | None:
+    """The plan that a policy is driving; None where it has none, or does not show it."""
+    if isinstance(policy, ShowsPlan):
+        return policy.current_plan
+    return None
 
 
 @runtime_checkable

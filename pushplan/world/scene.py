@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass, replace
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,13 +13,11 @@ from pushplan.errors import InvalidInputError
 from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, Shape
 from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray
 from pushplan.world.goals import (
-    ClearanceArea,
     Goal,
     GoalDisc,
     GoalLine,
     ManipulationGoal,
     NavigationGoal,
-    Receptacle,
 )
 from pushplan.world.movables import Movables
 from pushplan.world.outline import transform, transform_outlines
@@ -65,11 +63,18 @@ class World(ArrayRecord, CheckedFields):
         if self.robot_twist is None:
             object.__setattr__(self, "robot_twist", np.zeros(3))
         super().__post_init__()
-        if not isinstance(self.goal, GoalDisc | GoalLine | Receptacle | ClearanceArea):
+        if not isinstance(self.goal, Goal):
             raise InvalidInputError(
                 "world.goal must be a GoalDisc, GoalLine, Receptacle or ClearanceArea, "
                 f"got {type(self.goal).__name__}"
             )
+
+    @property
+    def goal_kind(self) -> Literal["robot", "objects"]:
+        """Those who have to reach the goal."""
+        if isinstance(self.goal, ManipulationGoal):
+            return "objects"
+        return "robot"
 
     @property
     def navigation_goal(self) -> NavigationGoal:
@@ -78,7 +83,7 @@ class World(ArrayRecord, CheckedFields):
         Raises:
             InvalidInputError: if it is a goal for the objects.
         """
-        if not isinstance(self.goal, GoalDisc | GoalLine):
+        if not isinstance(self.goal, NavigationGoal):
             raise InvalidInputError(
                 "this needs a goal for the robot (GoalDisc or GoalLine), "
                 f"got {type(self.goal).__name__}"
@@ -92,7 +97,7 @@ class World(ArrayRecord, CheckedFields):
         Raises:
             InvalidInputError: if it is a goal for the robot.
         """
-        if not isinstance(self.goal, Receptacle | ClearanceArea):
+        if not isinstance(self.goal, ManipulationGoal):
             raise InvalidInputError(
                 "this needs a goal for the objects (Receptacle or ClearanceArea), "
                 f"got {type(self.goal).__name__}"
@@ -153,9 +158,10 @@ class World(ArrayRecord, CheckedFields):
         changes: dict[str, Any] = {
             "robot_pose": robot_pose,
             "robot_twist": robot_twist,
-            "movables": None if movable_poses is None else self.movables.moved_to(movable_poses),
             "time": time,
         }
+        if movable_poses is not None:
+            changes["movables"] = self.movables.moved_to(movable_poses)
         return replace(self, **{key: value for key, value in changes.items() if value is not None})
 
     def updated(

@@ -115,6 +115,11 @@ class StaticMap(ArrayRecord, CheckedFields):
         polygons, bounds = occupancy_polygons(full, resolution, origin, beyond)
         return cls.build(polygons, bounds=bounds)
 
+    @property
+    def is_empty(self) -> bool:
+        """True if nothing stands there: neither a polygon nor a segment."""
+        return not len(self.polygons) and not len(self.segments)
+
     @cached_property
     def convex_parts(self) -> tuple[FloatArray, ...]:
         """Every obstacle as a convex polygon (N, 2) [m].
@@ -134,7 +139,9 @@ class StaticMap(ArrayRecord, CheckedFields):
 def capsule(a: FloatArray, b: FloatArray, radius: float) -> FloatArray:
     """Circumscribed convex polygon of the points within ``radius`` of the segment a-b."""
     along = b - a
-    heading = float(np.arctan2(along[1], along[0])) if along.any() else 0.0
+    heading = 0.0
+    if along.any():  # a difference of negative zeros would point backwards
+        heading = float(np.arctan2(along[1], along[0]))
     # corners of a circumscribed circle lie between its points of tangency
     step = np.pi / CAP_CORNERS
     angles = heading - np.pi / 2 + step * (np.arange(CAP_CORNERS) + 0.5)

@@ -192,5 +192,10 @@ def check_rules(stop: object, rng: object) -> tuple[Stop | None, np.random.Gener
     Raises:
         InvalidInputError: naming the argument and the type that it must have.
     """
-    rule = None if stop is None else expect("stop", stop, Stop)  # type: ignore[type-abstract]
-    return rule, None if rng is None else expect("rng", rng, np.random.Generator)
+    rule: Stop | None = None
+    if stop is not None:
+        rule = expect("stop", stop, Stop)  # type: ignore[type-abstract]
+    generator: np.random.Generator | None = None
+    if rng is not None:
+        generator = expect("rng", rng, np.random.Generator)
+    return rule, generator

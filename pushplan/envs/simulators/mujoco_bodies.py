@@ -254,7 +254,9 @@ class MujocoBodies:
         model = self.model
         data = self.data
         options = self._options
-        longest = options.water_time_step if self.afloat else options.time_step
+        longest = options.time_step
+        if self.afloat:
+            longest = options.water_time_step
         steps = max(1, math.ceil(interval / longest - 1e-9))
         model.opt.timestep = interval / steps
         if self._drag is None:

@@ -90,7 +90,12 @@ def _description(
     x, y = 0.5 * (static.bounds[:2] + static.bounds[2:])
     sides = static.bounds[2:] - static.bounds[:2]
     half = 0.5 * float(sides.max())
-    time_step = options.water_time_step if afloat else options.time_step
+    if afloat:
+        time_step = options.water_time_step
+        driven = _thrusters(robot, options)
+    else:
+        time_step = options.time_step
+        driven = _wheels(robot, solids, options)
     frictions = {
         "object_ground": materials.object_ground,
         "object_static": materials.object_static,
@@ -104,7 +109,7 @@ def _description(
     }
     return _filled(
         "scene",
-        driven=_thrusters(robot, options) if afloat else _wheels(robot, solids, options),
+        driven=driven,
         time_step=time_step,
         gravity=0.0 if afloat else -GRAVITY,
         iterations=options.iterations,
@@ -272,7 +277,9 @@ def _add_object(
 def _caster_corners(outline: FloatArray) -> FloatArray:
     """(3 or 4, 2) corners that carry casters, spread evenly over the outline."""
     count = len(outline)
-    return outline[[i * count // 4 for i in range(4)]] if count > 4 else outline
+    if count <= 4:
+        return outline
+    return outline[[i * count // 4 for i in range(4)]]
 
 
 def _set_damping(model: Any, movables: Movables, materials: Materials) -> None:

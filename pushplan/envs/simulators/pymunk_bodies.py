@@ -47,7 +47,9 @@ def _step_of(space: pymunk.Space) -> Callable[[float], None]:
     engine = getattr(getattr(pymunk, "_chipmunk", None), "lib", None)
     raw = getattr(engine, "cpSpaceStep", None)
     handle = getattr(space, "_space", None)
-    return space.step if raw is None or handle is None else partial(raw, handle)
+    if raw is None or handle is None:
+        return space.step
+    return partial(raw, handle)
 
 
 class _Contacts:
@@ -242,7 +244,9 @@ class PymunkBodies:
     def slowed(self, rows: FloatArray, h: float) -> FloatArray:
         """The rows with the velocities that bodies keep when nothing touches them for ``h`` [s]."""
         kept = rows.copy()
-        kept[:, 3:] = 0.0 if self._carried is None else self._carried.after(rows[:, 3:], h)
+        kept[:, 3:] = 0.0
+        if self._carried is not None:
+            kept[:, 3:] = self._carried.after(rows[:, 3:], h)
         return kept
 
     def drive(self, vx: float, vy: float, w: float) -> None:

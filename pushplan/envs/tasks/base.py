@@ -6,7 +6,6 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -161,9 +160,11 @@ class Task(ABC):
                 )
         except InvalidInputError as error:
             raise ScenarioError(f"{self.name}: {error}") from error
-        options = {} if preset.bumper is None else {"bumper": bumper or preset.bumper}
-        make = partial(make_robot, name) if name in others else partial(preset.robot, name)
-        robot = make(drive_of(self.action), **options)
+        options = {}
+        if preset.bumper is not None:
+            options["bumper"] = bumper or preset.bumper
+        make = make_robot if name in others else preset.robot
+        robot: RobotModel = make(name, drive_of(self.action), **options)
         self._drive(robot)
         if self.materials.solids is not None and name in SOLIDS:
             self.materials = replace(self.materials, solids=SOLIDS[name])
@@ -272,4 +273,6 @@ class Task(ABC):
 
 def drive_of(action: str) -> Drive:
     """Return the drive of a robot that is commanded by an action mode."""
-    return Drive.CONSTANT_SPEED if action == "turn_rate" else Drive.DIFFERENTIAL
+    if action == "turn_rate":
+        return Drive.CONSTANT_SPEED
+    return Drive.DIFFERENTIAL

@@ -149,7 +149,9 @@ class BoxDeliveryTask(ManipulationTask):
 
     def leaving(self, ids: IntArray, poses: FloatArray) -> IntArray:
         """Boxes with all corners inside the receptacle."""
-        return those_inside(self._mouth, self._start, ids, poses) if len(ids) else ids
+        if not len(ids):
+            return ids
+        return those_inside(self._mouth, self._start, ids, poses)
 
     def _measure(self, world: World) -> tuple[FloatArray, BoolArray]:
         distances = np.zeros(self.box_count)

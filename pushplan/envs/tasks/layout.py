@@ -291,19 +291,24 @@ def place_boxes(
     Raises:
         ScenarioError: if there is no room for them.
     """
+    touching = wanted.touching
+    if touching is None:
+        touching = preset.touching
     poses = free_space.place_squares(
         rng,
         count,
         size + 2.0 * preset.contact_radius,
         robot=robot,
-        touching=preset.touching if wanted.touching is None else wanted.touching,
+        touching=touching,
         gap=GAP * size,
         random_yaw=wanted.box_yaw == "random",
         **rules,
     )
     on_casters = np.zeros(count, dtype=bool)
     on_casters[rng.permutation(count)[: round(wanted.wheeled * count)]] = True
-    masses = None if preset.box_mass is None else np.full(count, preset.box_mass)
+    masses = None
+    if preset.box_mass is not None:
+        masses = np.full(count, preset.box_mass)
     return Movables.from_outlines(
         [_CORNERS * size] * count,
         poses,

@@ -66,7 +66,9 @@ class NamoTask(MazeTask):
         self._steps = 0
         draw = LAYOUTS[self.variations.layout]
         unit = self.unit
-        size = 1.0 if self.variations.box_size is None else self.variations.box_size / unit
+        size = 1.0
+        if self.variations.box_size is not None:
+            size = self.variations.box_size / unit
         for _ in range(_TRIES):
             layout = draw(rng, size)
             world = self._world(rng, layout)
@@ -94,7 +96,9 @@ class NamoTask(MazeTask):
         robot = rng.uniform((1.2, 1.2, -np.pi), (3.0, width - 1.2, np.pi))
         goal = rng.uniform((end - 2.2, 1.5), (end - 1.5, width - 1.5))
         areas = np.array([length * wide for length, wide in layout.sizes])
-        mass = unit**2 if self.preset.box_mass is None else self.preset.box_mass
+        mass = self.preset.box_mass
+        if mass is None:
+            mass = unit**2
         boxes = Movables.from_outlines(
             [box_outline(size, unit) for size in layout.sizes],
             np.column_stack([unit * np.array(layout.places), np.zeros(len(areas))]),
@@ -114,6 +118,7 @@ class NamoTask(MazeTask):
         if self.variations.movability == "known":
             return world
         fixed = world.movables.fixed
-        wrong = self.variations.movability == "wrong"
-        told = np.logical_not(fixed) if wrong else np.zeros(len(fixed), dtype=bool)
+        told = np.zeros(len(fixed), dtype=bool)
+        if self.variations.movability == "wrong":
+            told = np.logical_not(fixed)
         return world.believing(told)

@@ -18,7 +18,6 @@ from pushplan.envs.tasks.variations import TaskVariations
 from pushplan.geometry.distance_field import geodesic_field
 from pushplan.observation import ImageObservation
 from pushplan.world import (
-    ClearanceArea,
     InvalidInputError,
     Receptacle,
     ScenarioError,
@@ -116,17 +115,18 @@ class RoomTask(Task):
         self._far = float(self._field.values[np.isfinite(self._field.values)].max(initial=0.0))
         self.goal = world.goal
         self.objects_leave = isinstance(world.goal, Receptacle)
-        if isinstance(world.goal, Receptacle | ClearanceArea):
-            self.goal_kind = "objects"
+        self.goal_kind = world.goal_kind
+        if self.goal_kind == "objects":
             self._way = self._way_of_objects()
             is_done = bool(world.completed.all())
         else:
             self._way = self._field.exact(*world.robot_pose[:2].tolist())
             is_done = self._way == 0.0
-        if is_done or self._way == math.inf:
-            starts = "the robot starts" if self.goal_kind == "robot" else "every object starts"
-            where = f"{starts} in the goal" if is_done else "no way leads to the goal"
-            raise ScenarioError(f"room: {where} in {path}")
+        if is_done:
+            who = "the robot" if self.goal_kind == "robot" else "every object"
+            raise ScenarioError(f"room: {who} starts in the goal in {path}")
+        if self._way == math.inf:
+            raise ScenarioError(f"room: no way leads to the goal in {path}")
         self._idle_since = 0
 
     def _way_of_objects(self) -> float:
@@ -246,11 +246,12 @@ class RoomTask(Task):
     def goal_kind_of(cls, variations: Mapping[str, object]) -> Literal["robot", "objects"]:
         """As the file has it; the robot's where it cannot be read."""
         path = variations.get("world_file")
+        if path is None:
+            return cls.goal_kind
         try:
-            goal = None if path is None else load_world(str(path)).goal
+            return load_world(str(path)).goal_kind
         except InvalidInputError:
             return cls.goal_kind
-        return "objects" if isinstance(goal, Receptacle | ClearanceArea) else "robot"
 
     def _image(self, name: str) -> ImageObservation:
         window = _WINDOW * 2.0 * self.robot.circumscribed_radius

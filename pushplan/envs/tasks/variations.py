@@ -27,7 +27,9 @@ class TaskVariations(CheckedFields):
 
     def limit(self, robot: RobotModel) -> RobotModel:
         """The robot of a preset with these limits of speed and turn rate."""
-        speed = robot.max_speed if self.max_speed is None else self.max_speed
+        speed = self.max_speed
+        if speed is None:
+            speed = robot.max_speed
         return replace(
             robot,
             max_speed=speed,

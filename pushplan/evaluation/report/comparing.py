@@ -58,7 +58,9 @@ class Rule:
     relative: bool
 
     def __str__(self) -> str:
-        bound = f"{100.0 * self.bound:+g}%" if self.relative else f"{self.bound:+g}"
+        bound = f"{self.bound:+g}"
+        if self.relative:
+            bound = f"{100.0 * self.bound:+g}%"
         return f"{self.metric}{'>' if self.above else '<'}{bound}"
 
 
@@ -172,14 +174,14 @@ def verdict_table(verdicts: Sequence[Verdict]) -> Table:
     cells = []
     for one in verdicts:
         scale, unit = (100.0, " %") if one.rule.relative else (1.0, "")
-        change = "" if math.isnan(one.change) else f"{scale * one.change:+.3g}{unit}"
-        interval = f"\n[{scale * one.low:+.3g}, {scale * one.high:+.3g}]" if change else ""
+        change = ""
+        if not math.isnan(one.change):
+            interval = f"[{scale * one.low:+.3g}, {scale * one.high:+.3g}]"
+            change = f"{scale * one.change:+.3g}{unit}\n{interval}"
         more = f"\n{one.needed} needed" if one.needed else ""
         count = f"{one.count}" + ("" if one.paired else "\nnot paired")
         means = [f"{value:.4g}" for value in (one.old, one.new)]
-        cells.append(
-            (str(one.rule), one.policy, *means, change + interval, count, one.verdict + more)
-        )
+        cells.append((str(one.rule), one.policy, *means, change, count, one.verdict + more))
     headings = ("rule", "policy", "old", "new", "change", "scenarios", "verdict")
     return Table("New run beside the old one", headings, tuple(cells), NOTE)
 
@@ -189,8 +191,11 @@ def _judge(
 ) -> Verdict:
     common = sorted(one.keys() & two.keys())
     paired = bool(common)
-    old = np.array([one[key] for key in common] if paired else list(one.values()))
-    new = np.array([two[key] for key in common] if paired else list(two.values()))
+    if paired:
+        one = {key: one[key] for key in common}
+        two = {key: two[key] for key in common}
+    old = np.array(list(one.values()))
+    new = np.array(list(two.values()))
     count = min(len(old), len(new))
     if count == 0:
         nan = math.nan
@@ -218,10 +223,16 @@ def _judge(
     sign = 1.0 if rule.above else -1.0
     best, worst = sorted((sign * low, sign * high))
     bound = sign * rule.bound
-    verdict = "regressed" if best > bound else "ok" if worst <= bound else "unclear"
-    if count < ENOUGH and (low != 0.0 or high != 0.0) and verdict != "ok":
-        verdict = "unclear"
-    needed = pairs_needed(gaps - rule.bound) if verdict == "unclear" and paired else None
+    # few scenarios condemn nothing, unless there is no change at all in any of them
+    may_condemn = count >= ENOUGH or low == high == 0.0
+    verdict = "unclear"
+    if best > bound and may_condemn:
+        verdict = "regressed"
+    elif worst <= bound:
+        verdict = "ok"
+    needed = None
+    if verdict == "unclear" and paired:
+        needed = pairs_needed(gaps - rule.bound)
     means = float(old.mean()), float(new.mean())
     return Verdict(
         rule, policy, setting, count, paired, *means, change, low, high, verdict, needed

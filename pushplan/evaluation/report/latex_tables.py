@@ -142,5 +142,6 @@ def _character(character: str) -> str:
     if kind in ("<sub>", "<super>"):
         return f"${'_' if kind == '<sub>' else '^'}{{{inner.replace('$', '')}}}$"
     for mark in marks:
-        inner = rf"\{_ACCENTS[mark]}{{{inner}}}" if mark in _ACCENTS else inner
+        if mark in _ACCENTS:
+            inner = rf"\{_ACCENTS[mark]}{{{inner}}}"
     return inner or f"[U+{ord(character):04X}]"

@@ -116,9 +116,12 @@ def page_data(run: StoredRun, replays: Mapping[str, int]) -> dict[str, Any]:
     values = _values(run)
     headings = {name: heading(name) for name in values if name in METRICS}
     headings |= {name: name.removesuffix("_s") + " [s]" for name in _TIMES}
-    outcomes = [
-        row.status if row.failed else "success" if row.success else row.reason for row in run.rows
-    ]
+    outcomes = []
+    for row in run.rows:
+        if row.failed:
+            outcomes.append(row.status)
+        else:
+            outcomes.append("success" if row.success else row.reason)
     return {
         "folder": str(run.path) if run.path is not None else "DIR",
         "policies": policies,

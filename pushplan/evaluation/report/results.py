@@ -71,7 +71,9 @@ class Results(StoredRun):
             pairs: as for `compare`.
         """
         titles = self.titles
-        found = self.pooled.tables(wide=wide, pairs=pairs) if len(titles) > 1 else []
+        found: list[Table] = []
+        if len(titles) > 1:
+            found = self.pooled.tables(wide=wide, pairs=pairs)
         if found and not settings:
             return found
         metrics = self.about.get("metrics", [])
@@ -180,8 +182,10 @@ class Results(StoredRun):
         folder = Path(out) if out is not None else self.path or Path()
         if not is_page(folder / PAGE):
             check_folder(folder, "run directory", DATABASE)
-        there = open_results(folder)[0] if os.path.lexists(folder / DATABASE) else self.rows
-        if set(there) != set(self.rows):
+        there = set(self.rows)
+        if os.path.lexists(folder / DATABASE):
+            there = set(open_results(folder)[0])
+        if there != set(self.rows):
             raise InvalidInputError(
                 f"{folder} is the directory of a run with {len(there)} rows, which are not the "
                 f"{len(self.rows)} of these results: report to another folder, or report that run "

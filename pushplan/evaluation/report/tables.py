@@ -112,8 +112,9 @@ def score_tables(
     tables = []
     for setting in dict.fromkeys(s.setting for s in summaries):
         mine = [s for s in summaries if s.setting == setting]
-        shown = metric_names(Role.SCORE, Role.DETAIL) if wide else metric_names(Role.SCORE)
-        shown = (*shown, *(("wall_time_s",) if wide else ()), *_TIMES)
+        shown = [*metric_names(Role.SCORE), *_TIMES]
+        if wide:
+            shown = [*metric_names(Role.SCORE, Role.DETAIL), "wall_time_s", *_TIMES]
         metrics = [name for name in shown if any(name in s.metrics for s in mine)]
         headings = ("policy", "runs", "success", *(heading(name) for name in metrics))
         cells = []
@@ -121,19 +122,25 @@ def score_tables(
             failed = f"\n{summary.failed} failed" if summary.failed else ""
             rate = summary.success
             success = f"{rate.fraction:.2f}\n{_interval(rate, 2)}"
-            line = [summary.policy, f"{summary.episodes}{failed}", success]
-            for name in metrics:
-                value = summary.metrics.get(name)
-                text = "" if value is None else _estimate(value, _digits(name), wide=wide)
-                if value is not None and name in _TIMES:
-                    worst = summary.metrics.get(_TIMES[name])
-                    greatest = "" if worst is None else f"\nmax {milliseconds(worst.highest)}"
-                    text = milliseconds(value.median) + greatest
-                line.append(text)
-            cells.append(tuple(line))
+            values = (_score(summary, name, wide=wide) for name in metrics)
+            cells.append((summary.policy, f"{summary.episodes}{failed}", success, *values))
         note = SCORE_NOTE + ("; med is the median" if wide else "")
         tables.append(Table(titles.get(setting, setting), headings, tuple(cells), note))
     return tables
+
+
+def _score(summary: PolicySummary, name: str, *, wide: bool) -> str:
+    """The cell of a metric; of times the median and the longest, since their means say little."""
+    value = summary.metrics.get(name)
+    if value is None:
+        return ""
+    if name not in _TIMES:
+        return _estimate(value, _digits(name), wide=wide)
+    text = milliseconds(value.median)
+    longest = summary.metrics.get(_TIMES[name])
+    if longest is not None:
+        text += f"\nmax {milliseconds(longest.highest)}"
+    return text
 
 
 def gap_tables(found: Sequence[Gap], titles: Mapping[str, str]) -> list[Table]:
@@ -208,6 +215,9 @@ def difference_tables(
             star = " *" if pair.significant else ""
             line = brief.setdefault(names, [""] * len(metrics))
             line[metrics.index(pair.metric)] = f"{mean} {interval}{star}"
+            p_value = f"{pair.p_corrected:.3f}"
+            if pair.p_corrected < 0.001:
+                p_value = "< 0.001"
             cells.append(
                 (
                     heading(pair.metric),
@@ -215,7 +225,7 @@ def difference_tables(
                     mean + star,
                     interval,
                     f"{pair.better} / {pair.worse} / {pair.difference.count}",
-                    "< 0.001" if pair.p_corrected < 0.001 else f"{pair.p_corrected:.3f}",
+                    p_value,
                     f"{pair.effect:+.2f}",
                     _more(pair),
                 )
@@ -233,12 +243,13 @@ def difference_tables(
 
 def on_few_lines(tables: Sequence[Table]) -> list[Table]:
     """The tables with a line for each row, where there are many."""
-    return [
-        replace(table, cells=tuple(tuple(c.replace("\n", " ") for c in row) for row in table.cells))
-        if len(table.cells) > MANY_POLICIES
-        else table
-        for table in tables
-    ]
+    found = []
+    for table in tables:
+        if len(table.cells) > MANY_POLICIES:
+            cells = (tuple(text.replace("\n", " ") for text in row) for row in table.cells)
+            table = replace(table, cells=tuple(cells))
+        found.append(table)
+    return found
 
 
 def _more(pair: PairedDifference) -> str:

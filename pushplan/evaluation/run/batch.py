@@ -43,6 +43,13 @@ _TURN = 20
 Submit = Callable[[Job], "Future[JobResult]"]
 
 
+def worker_count(workers: int | None) -> int:
+    """The number of worker processes: that of the cores if it is None; 0 are none."""
+    if workers is None:
+        return os.cpu_count() or 1
+    return integer("workers", workers, low=0)
+
+
 def run_batch(
     jobs: Iterable[Job],
     *,
@@ -93,7 +100,7 @@ def run_batch(
     """
     jobs = list(jobs)
     settings = JobSettings() if settings is None else settings
-    workers = os.cpu_count() or 1 if workers is None else integer("workers", workers, low=0)
+    workers = worker_count(workers)
     if memory_limit_mb is not None:
         number("memory_limit_mb", memory_limit_mb, low=1.0)
     choice("traces", traces, TRACES)

@@ -65,7 +65,9 @@ def execute(job: Job, settings: JobSettings, owner_pid: int | None = None) -> Jo
         owner_pid: process that waits for the outcome and cannot end this one by force. Given
             from another process, a job that ignores its limit ends its own process.
     """
-    by_force = settings.force_after_s if owner_pid not in (None, os.getpid()) else None
+    by_force = None
+    if owner_pid not in (None, os.getpid()):
+        by_force = settings.force_after_s
     try:
         check_unchanged(job, settings)
         with _folder_kept(), hard_limit(by_force), soft_limit(settings.timeout_s):

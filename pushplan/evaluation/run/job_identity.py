@@ -113,8 +113,10 @@ _distributions = functools.cache(metadata.packages_distributions)
 def settings_dict(settings: JobSettings) -> dict[str, Any]:
     """Return the settings of a batch on which results depend."""
     make = settings.make_env
+    if not isinstance(make, str):
+        make = getattr(make, "__qualname__", "callable")
     return {
-        "make_env": make if isinstance(make, str) else getattr(make, "__qualname__", "callable"),
+        "make_env": make,
         "observation": settings.observation,
         "timeout_s": settings.timeout_s,
         "latency_factor": settings.latency_factor,
@@ -206,7 +208,9 @@ def _restored(value: Any) -> Any:
     if "class" not in value:
         return inner
     module, _, name = str(value["class"]).partition(":")
-    kind = getattr(importlib.import_module(module), name) if module.startswith(_OURS) else None
+    kind = None
+    if module.startswith(_OURS):
+        kind = getattr(importlib.import_module(module), name)
     if not is_dataclass(kind) or not isinstance(kind, type):
         raise InvalidInputError(f"an option names {value['class']!r}, which is no class of ours")
     return kind(**inner)

@@ -95,7 +95,9 @@ class JobSettings(CheckedFields):
     @property
     def force_after_s(self) -> float | None:
         """When a job is ended by force [s]."""
-        return None if self.timeout_s is None else self.timeout_s + self.grace_s
+        if self.timeout_s is None:
+            return None
+        return self.timeout_s + self.grace_s
 
     def environment(self, scenario: Any, policy: Policy, **options: Any) -> Any:
         """A fresh environment for one job; ``options`` go to its factory."""
@@ -105,7 +107,9 @@ class JobSettings(CheckedFields):
             observation = "state" if wanted is None else wanted
         if isinstance(policy, ChoosesActions):
             options = {"action": policy.actions, **options}
-        make = load_object(self.make_env) if isinstance(self.make_env, str) else self.make_env
+        make = self.make_env
+        if isinstance(make, str):
+            make = load_object(make)
         env = make(scenario, observation=observation, **options)
         if isinstance(policy, ChecksEnvironment):
             policy.check_environment(env, scenario)

@@ -55,7 +55,9 @@ def pending_jobs(jobs: Sequence[Job], store: RunDirectory, any_version: bool) ->
     shown = []
     pending = []
     for job in jobs:
-        names = [job.id, *([same_but_versions(job.spec)] if any_version and job.spec else [])]
+        names = [job.id]
+        if any_version and job.spec:
+            names.append(same_but_versions(job.spec))
         if (there := next((done[name] for name in names if name in done), None)) is None:
             pending.append(job)
         else:

@@ -85,12 +85,13 @@ class PolicySpec:
             parts = inner or [PolicySpec(self.label, source.func)]
             return set().union(*(one.libraries for one in parts))
         if not isinstance(source, str):
-            return libraries_of(
-                _module_of(source if hasattr(source, "__module__") else type(source))
-            )
+            named = source if hasattr(source, "__module__") else type(source)
+            return libraries_of(_module_of(named))
         if source.startswith("sb3:"):
             return {"stable_baselines3", "torch"}
-        return set() if self.is_ours else libraries_of(source.rpartition(":")[0])
+        if self.is_ours:
+            return set()
+        return libraries_of(source.rpartition(":")[0])
 
     @property
     def is_ours(self) -> bool:
@@ -118,7 +119,9 @@ class PolicySpec:
             return None
         if self.source.startswith(LEARNED_PREFIXES):
             return learned_file(self.source)
-        return weights_of(self.source) if self.source in learned_names() else None
+        if self.source in learned_names():
+            return weights_of(self.source)
+        return None
 
     def warm_up(self) -> None:
         """Load, once in a process, what a planner of ours may need in any step of an episode."""
@@ -168,7 +171,9 @@ class PolicySpec:
 
     def _made_object(self) -> Any:
         """Call the source, or the callable that it names, and return the result."""
-        source = load_object(self.source) if isinstance(self.source, str) else self.source
+        source: Any = self.source
+        if isinstance(source, str):
+            source = load_object(source)
         return source(**self.options)
 
 
@@ -233,7 +238,9 @@ def _saying_what_fails(kind: str, label: str) -> Iterator[None]:
         raise
     except (Exception, SystemExit) as error:
         ours = None if place(error) else missing(error) or error
-        said = str(ours) if isinstance(ours, PushplanError) else describe(error)
+        said = describe(error)
+        if isinstance(ours, PushplanError):
+            said = str(ours)
         raise UnusablePolicyError(f"{kind} {label!r} cannot be made: {said}") from error
 
 

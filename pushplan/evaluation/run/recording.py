@@ -104,9 +104,9 @@ class Recording:
         clock: Clock = time.perf_counter,
     ) -> None:
         self.policy = policy
-        self.latency_factor = (
-            None if latency_factor is None else number("latency_factor", latency_factor, low=0.0)
-        )
+        if latency_factor is not None:
+            latency_factor = number("latency_factor", latency_factor, low=0.0)
+        self.latency_factor = latency_factor
         self._clock = clock
         self._executor = SimulatedExecutor(self.latency_factor or 0.0, clock)
         self.scenario = scenario
@@ -179,8 +179,21 @@ class Recording:
             reason: why it ended, where that was a failure.
         """
         assert self._world is not None
-        actions = np.array(self._actions) if self._actions else np.zeros((0, 0))
+        actions = np.zeros((0, 0))
+        if self._actions:
+            actions = np.array(self._actions)
         times, robot_poses, object_poses = map(np.concatenate, zip(*self._motion, strict=True))
+        about = {
+            "policy": self.label,
+            "scenario": self.scenario.to_dict(),
+            "key": self.scenario.key,
+            "seed": self.scenario.seed,
+            "pushplan": pushplan.__version__,
+        }
+        if self.latency_factor is not None:
+            about["latency_factor"] = self.latency_factor
+        if held_for(self.policy) != 1:
+            about["held_for"] = held_for(self.policy)
         return Episode(
             world=self._world,
             times=times,
@@ -194,15 +207,7 @@ class Recording:
             act_times_s=np.array(self._act_times),
             plans=None if self._plans is None else self._plans.recorded(),
             plan_times_s=np.array(plan_times(self.policy) or []),
-            about={
-                "policy": self.label,
-                "scenario": self.scenario.to_dict(),
-                "key": self.scenario.key,
-                "seed": self.scenario.seed,
-                "pushplan": pushplan.__version__,
-                **({} if self.latency_factor is None else {"latency_factor": self.latency_factor}),
-                **({} if held_for(self.policy) == 1 else {"held_for": held_for(self.policy)}),
-            },
+            about=about,
         )
 
     def _changes_mode(self, env: Any, action: object) -> bool:
@@ -271,7 +276,9 @@ def asked(method: Callable[..., Any], *arguments: Any) -> Any:
 
 def held_for(policy: Policy) -> int:
     """Steps for which a decision of the policy stands: more than 1 for some networks."""
-    return policy.steps_per_decision if isinstance(policy, HoldsDecisions) else 1
+    if isinstance(policy, HoldsDecisions):
+        return policy.steps_per_decision
+    return 1
 
 
 def observation_time(env: Any, policy: Policy, step: int) -> float:
@@ -289,7 +296,9 @@ def observation_time(env: Any, policy: Policy, step: int) -> float:
 
 def wanted_observation(policy: object) -> Any:
     """The name or builder of what a policy observes; None if it looks at the world alone."""
-    return policy.observation if isinstance(policy, ChoosesObservation) else None
+    if isinstance(policy, ChoosesObservation):
+        return policy.observation
+    return None
 
 
 def checked_action(env: Any, action: object) -> FloatArray:

@@ -101,7 +101,9 @@ def _answer(lines: BufferedRWPair, payload: bytes, setup: WorkerSetup) -> bool:
             return False
         _say(lines, kind="running")
         result = execute(job, settings)
-        trace = None if result.trace is None else base64.b64encode(result.trace).decode()
+        trace = None
+        if result.trace is not None:
+            trace = base64.b64encode(result.trace).decode()
         _say(lines, kind="result", row=asdict(result.row), trace=trace, detail=result.detail)
         return result.tainted
     except InvalidInputError as error:  # `execute` lets through what is no policy's fault

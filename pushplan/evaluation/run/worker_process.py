@@ -125,7 +125,9 @@ class WorkerProcess:
         if said.get("kind") == "out of memory":
             raise self._died("an allocation failed", Status.OUT_OF_MEMORY)
         try:  # who sends it is not trusted: the owner checks what it says
-            trace = None if said["trace"] is None else base64.b64decode(said["trace"])
+            trace = said["trace"]
+            if trace is not None:
+                trace = base64.b64decode(trace)
             return JobResult(ResultRow(**said["row"]), trace, str(said["detail"]))
         except (KeyError, TypeError, ValueError) as error:
             raise self._died(f"its message is no result: {error}") from error

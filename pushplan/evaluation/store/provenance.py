@@ -46,11 +46,16 @@ def provenance(workers: int) -> dict[str, Any]:
         ``machine``, ``cores``, ``load`` (of the last minute, None if unknown), ``workers`` and
         ``packages`` (name -> version).
     """
-    root = Path(pushplan.__file__).resolve().parents[1]
-    commit, changed = _checkout(root) if (root / ".git").exists() else (None, None)
+    commit, changed = _checkout(Path(pushplan.__file__).resolve().parents[1])
+    command = ""
+    if sys.argv[0]:  # empty in an interactive session
+        command = shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])
+    load = None
+    if hasattr(os, "getloadavg"):  # not on Windows
+        load = round(os.getloadavg()[0], 2)
     return {
         "began": instant(),
-        "command": shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]) if sys.argv[0] else "",
+        "command": command,
         "pushplan": pushplan.__version__,
         "commit": commit,
         "changed": changed,
@@ -58,7 +63,7 @@ def provenance(workers: int) -> dict[str, Any]:
         "system": platform.platform(terse=True),
         "machine": platform.machine(),
         "cores": os.cpu_count(),
-        "load": round(os.getloadavg()[0], 2) if hasattr(os, "getloadavg") else None,
+        "load": load,
         "workers": workers,
         "packages": packages(),
     }
@@ -126,7 +131,9 @@ def package_digest() -> str:
 
 
 def _checkout(root: Path) -> tuple[str | None, bool | None]:
-    """Commit of the code that runs, and whether it has been changed."""
+    """Commit of the code that runs, and whether it has been changed; None outside of a checkout."""
+    if not (root / ".git").exists():  # Git would take that of a folder above
+        return None, None
     said = []
     for words in (["rev-parse", "HEAD"], ["status", "--porcelain", "--untracked-files=no"]):
         command = ["git", "-C", str(root), *words]

@@ -82,4 +82,6 @@ def rescore(path: str | Path, metrics: Sequence[str] = (), *, columns: bool = Tr
 def metric_label(metric: str) -> str:
     """Return the name of a metric in results: its own, or that of a file without its folder."""
     where, colon, name = metric.rpartition(":")
-    return f"{Path(where).name}{colon}{name}" if where.endswith(".py") else metric
+    if not where.endswith(".py"):
+        return metric
+    return f"{Path(where).name}{colon}{name}"

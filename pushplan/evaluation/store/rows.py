@@ -28,7 +28,9 @@ REASON_LENGTH = 300
 def clean_reason(reason: object) -> str:
     """A reason as it is stored: one line of printable text without addresses of objects."""
     text = re.sub(r"0x[0-9a-fA-F]{6,}", "0x...", one_line(str(reason)))
-    return text if len(text) <= REASON_LENGTH else text[: REASON_LENGTH - 3] + "..."
+    if len(text) <= REASON_LENGTH:
+        return text
+    return text[: REASON_LENGTH - 3] + "..."
 
 
 def instant() -> str:
@@ -228,8 +230,10 @@ def row_from_texts(texts: Mapping[str, str | None]) -> ResultRow:
             values[name] = text
         elif kind == "bool":
             values[name] = {"1": True, "0": False}[text]
+        elif not text:
+            values[name] = None
         else:
-            values[name] = (int if kind == "int" else float)(text) if text else None
+            values[name] = int(text) if kind == "int" else float(text)
     return checked_row(ResultRow.from_columns(values))
 
 

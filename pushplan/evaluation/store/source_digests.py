@@ -55,7 +55,9 @@ def code_digest(thing: Any) -> str:
     members = [getattr(one, "__func__", one) for kind in kinds for one in vars(kind).values()]
     codes = [getattr(one, "__code__", None) for one in (thing, *members)]
     text = "".join(_code_text(code) for code in codes if code is not None)
-    return f" code:{hashlib.sha256(text.encode()).hexdigest()[:12]}" if text else ""
+    if not text:
+        return ""
+    return f" code:{hashlib.sha256(text.encode()).hexdigest()[:12]}"
 
 
 def _code_text(code: CodeType) -> str:
@@ -89,7 +91,10 @@ def _content_hash(file: Path, *_version: int) -> str:
 
 def _sources(where: str) -> list[Path]:
     """The file of a ``file.py`` or module that is not ours, then the local ones it imports."""
-    first = Path(where).resolve() if where.endswith(".py") else _file_of(where)
+    if where.endswith(".py"):
+        first: Path | None = Path(where).resolve()
+    else:
+        first = _file_of(where)
     found = [] if first is None or not first.is_file() else [first]
     path = import_path(str(found[0].parent) if found else None)
     for file in found:  # which grows meanwhile

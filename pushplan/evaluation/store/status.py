@@ -71,8 +71,12 @@ def run_status(path: str | Path, slowest: int = 3) -> RunStatus:
         longest = tuple(
             (one_line(str(title)), number("wall_time_s", seconds)) for title, seconds in took
         )
-    end = datetime.now(UTC) if active or not last else datetime.fromisoformat(last)
-    elapsed = (end - datetime.fromisoformat(began)).total_seconds() if began else 0.0
+    end = datetime.now(UTC)
+    if last and not active:
+        end = datetime.fromisoformat(last)
+    elapsed = 0.0
+    if began:
+        elapsed = (end - datetime.fromisoformat(began)).total_seconds()
     jobs = int(call.get("jobs", 0))
     done = min(jobs, int(call.get("done", 0)) + new)
     rate = new / elapsed if elapsed > 0.0 else 0.0

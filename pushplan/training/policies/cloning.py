@@ -41,11 +41,10 @@ class Imitator:
         torch.manual_seed(chunk_seed(config.seed, 0))
         shape = env.observation_space.shape
         outputs = env.action.shape
-        network: Any = (
-            FlowPolicy(shape, options.widths, outputs, options.euler)
-            if isinstance(options, FlowOptions)
-            else DirectPolicy(shape, options.widths, outputs[0])
-        )
+        if isinstance(options, FlowOptions):
+            network: Any = FlowPolicy(shape, options.widths, outputs, options.euler)
+        else:
+            network = DirectPolicy(shape, options.widths, outputs[0])
         self.policy = network.to(device)
         self.optimizer = torch.optim.AdamW(
             network.parameters(), lr=options.rate, weight_decay=options.decay

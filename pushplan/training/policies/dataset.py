@@ -27,14 +27,9 @@ from pushplan.learned.specification import RobotSpec
 from pushplan.observation import ObservationBuilder
 from pushplan.training.policies.config import TrainingConfig
 from pushplan.training.policies.environment import TRAINING_SEEDS, environments
-from pushplan.world import (
-    ChoosesActions,
-    ChoosesObservation,
-    InvalidInputError,
-    SchemaError,
-    stream,
-)
+from pushplan.world import ChoosesObservation, InvalidInputError, SchemaError, stream
 from pushplan.world.checks import integer, number
+from pushplan.world.policy_abilities import action_modes
 
 SCHEMA = "pushplan-dataset/1"
 METADATA = "metadata.json"
@@ -104,9 +99,10 @@ def record(
     if folder.exists() and any(folder.iterdir()):
         raise InvalidInputError(f"{folder} is not empty")
     builder = builder_from_dict(config.observation)
-    wanted = policy.observation if isinstance(policy, ChoosesObservation) else "state"
-    mode = policy.actions if isinstance(policy, ChoosesActions) else None
-    envs = environments(config, wanted, mode)
+    wanted = "state"
+    if isinstance(policy, ChoosesObservation):
+        wanted = policy.observation
+    envs = environments(config, wanted, action_modes(policy) or None)
     (folder / "data").mkdir(parents=True, exist_ok=True)
     steps = successes = 0
     for index in range(episodes):
@@ -168,7 +164,9 @@ def _run(
                 driver.reset(env.world, stream(seed, "driver"))
         executed: NDArray[Any] = action
         if held:
-            executed = disturbed if driver is None else env.encode(driver.act(env.world))
+            executed = disturbed
+            if driver is not None:
+                executed = env.encode(driver.act(env.world))
         held = max(0, held - 1)
         seen, reward, terminated, truncated, info = env.step(executed)
         observed.append(builder.observe(env.world))

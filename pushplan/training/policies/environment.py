@@ -78,11 +78,10 @@ class TrainingEnv(gymnasium.Env[NDArray[Any], Any]):
                     f"{other}"
                 )
         self.observation_space: Any = self._env.observation_space
-        self.action_space: Any = (
-            Discrete(int(np.prod(self.action.shape)))
-            if self.action.output == "pixel_values"
-            else Box(-1.0, 1.0, self.action.shape, np.float32)
-        )
+        self._pixels = self.action.output == "pixel_values"  # actions are numbers of pixels
+        self.action_space: Any = Box(-1.0, 1.0, self.action.shape, np.float32)
+        if self._pixels:
+            self.action_space = Discrete(int(np.prod(self.action.shape)))
         self._rng = stream(config.seed, "starts")
         self._decisions = 0
         self._limit = config.limit
@@ -127,11 +126,10 @@ class TrainingEnv(gymnasium.Env[NDArray[Any], Any]):
 
     def step(self, action: Any) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
         """Carry out one decision."""
-        commands = (
-            self.action.chosen(divmod(int(action), self.action.shape[1]))
-            if self.action.output == "pixel_values"
-            else self.action.steps(action)
-        )
+        if self._pixels:
+            commands = self.action.chosen(divmod(int(action), self.action.shape[1]))
+        else:
+            commands = self.action.steps(action)
         total = 0.0
         for command in commands:
             _, reward, terminated, truncated, info = self._env.step(command)
@@ -167,6 +165,7 @@ def action_spec(config: TrainingConfig, env: PushEnv) -> ActionSpec:
     mode = config.action.mode
     shapes = {"direction": (2,), "chunk": (config.action.horizon, MODES[mode])}
     shape: tuple[int, ...] = shapes.get(output, (MODES[mode],))
+    window = 0.0
     if output == "pixel_values":
         view = builder_from_dict(config.observation)
         side = env.task.waypoint_window
@@ -176,11 +175,12 @@ def action_spec(config: TrainingConfig, env: PushEnv) -> ActionSpec:
                 f"{side:g} x {side:g} m, which waypoints reach, got {config.observation}"
             )
         shape = view.shape[1:]
+        window = side
     return ActionSpec(
         mode=mode,
         output=output,
         shape=shape,
         repeat=config.action.repeat,
-        window=env.task.waypoint_window if output == "pixel_values" else 0.0,
+        window=window,
         step=env.task.heading_step if mode == "heading" else 0.0,
     )

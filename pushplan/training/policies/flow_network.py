@@ -49,7 +49,9 @@ class FlowPolicy(nn.Module):
             noise: (B, horizon n) Gaussian; drawn if None.
         """
         context = self.of_seen(self.encoder(observations))
-        chunk = torch.randn(len(context), *self.noise) if noise is None else noise
+        chunk = noise
+        if chunk is None:
+            chunk = torch.randn(len(context), *self.noise)
         for step in range(self.euler):
             time = torch.tensor([[step / self.euler]])
             chunk = chunk + self._velocity(context, chunk.to(context), time) / self.euler

@@ -124,7 +124,9 @@ class SpatialActionDqn(DQN):
         self.config = config
         self.options = options
         channels = list(config.observation.get("channels", ()))
-        self.occupancy = channels.index("occupancy") if "occupancy" in channels else None
+        self.occupancy: int | None = None
+        if "occupancy" in channels:
+            self.occupancy = channels.index("occupancy")
         super().__init__(
             exploration_fraction=max(options.explore, 1e-9),
             exploration_final_eps=options.explore_end,

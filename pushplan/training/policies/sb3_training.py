@@ -74,11 +74,10 @@ class Sb3Learner:
         makers: list[Any] = [
             lambda: Monitor(TrainingEnv(config), info_keywords=("is_success",))
         ] * config.envs
-        env: Any = (
-            SubprocVecEnv(makers, start_method="forkserver")
-            if processes and config.envs > 1
-            else DummyVecEnv(makers)
-        )
+        if processes and config.envs > 1:
+            env: Any = SubprocVecEnv(makers, start_method="forkserver")
+        else:
+            env = DummyVecEnv(makers)
         is_image = len(env.observation_space.shape) == 3
         options = config.options
         arguments = {
@@ -147,7 +146,9 @@ class Sb3Learner:
             return True
 
         model.learn(len(steps), callback=watch, reset_num_timesteps=False, tb_log_name="tb")
-        loss = "train/critic_loss" if config.algorithm == "sac" else "train/loss"
+        loss = "train/loss"
+        if config.algorithm == "sac":
+            loss = "train/critic_loss"
         return Learned(
             model.num_timesteps,
             float(model.logger.name_to_value.get(loss, np.nan)),

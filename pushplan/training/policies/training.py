@@ -158,6 +158,13 @@ def _draw(run: TrainingRun) -> None:
     figure.savefig(str(run.path(PICTURE)), dpi=DPI)
 
 
+def _known(value: float) -> float | None:
+    """The value; None in place of NaN, which JSON has no word for."""
+    if math.isnan(value):
+        return None
+    return value
+
+
 def _finish(
     run: TrainingRun,
     network: Any,
@@ -170,10 +177,9 @@ def _finish(
     from pushplan.training.policies.dataset import read_metadata
     from pushplan.training.policies.export import decision_time, export, observation_time
 
-    libraries = [
-        "torch",
-        *([] if run.config.algorithm in IMITATING else ["stable_baselines3"]),
-    ]
+    libraries = ["torch"]
+    if run.config.algorithm not in IMITATING:
+        libraries.append("stable_baselines3")
     best = max(run.curve, key=lambda point: (point.rank, point.steps))
     specification = env.specification
     facts = {**specification.training, "best_steps": best.steps}
@@ -186,8 +192,8 @@ def _finish(
         steps=run.curve[-1].steps,
         seconds=run.seconds,
         best_steps=best.steps,
-        valid_success=None if math.isnan(best.valid_success) else best.valid_success,
-        valid_share=None if math.isnan(best.valid_share) else best.valid_share,
+        valid_success=_known(best.valid_success),
+        valid_share=_known(best.valid_share),
         hardware=f"{hardware(device)}, {threads} thread{'s' * (threads > 1)}",
         versions={
             "pushplan": pushplan.__version__,

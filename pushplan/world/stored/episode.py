@@ -95,7 +95,9 @@ class Episode(ArrayRecord, CheckedFields):
         if count == 0 and poses.size == 0:
             poses = np.zeros((length, 0, 3))
         put(self, "object_poses", array("episode.object_poses", poses, (length, count, 3)))
-        done = np.zeros(count, dtype=bool) if self.completed is None else self.completed
+        done = self.completed
+        if done is None:
+            done = np.zeros(count, dtype=bool)
         put(self, "completed", array("episode.completed", done, (count,), dtype=np.bool_))
         if self.plans is not None and (self.plans.moved >= count).any():
             raise InvalidInputError(f"plans.moved must hold indices of {count} objects")

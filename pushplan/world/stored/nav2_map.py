@@ -129,8 +129,13 @@ def _pixels(image: Any) -> tuple[IntArray, BoolArray]:
     hidden = image.info.get("transparency")
     if image.mode.startswith("I"):  # 16 bits of grey
         deep = np.asarray(image, dtype=np.int64)
-        return deep // 257, np.full(deep.shape, True) if hidden is None else deep != hidden
-    wanted = "RGB" if hidden is None and image.mode not in ("LA", "RGBA", "PA") else "RGBA"
+        shown = np.full(deep.shape, True)
+        if hidden is not None:
+            shown = deep != hidden
+        return deep // 257, shown
+    wanted = "RGB"
+    if hidden is not None or image.mode in ("LA", "RGBA", "PA"):
+        wanted = "RGBA"
     pixels = np.asarray(image.convert(wanted), dtype=np.int64)
     grey = (257 * pixels[..., :3] @ np.array([299, 587, 114]) + 500) // 1000 // 257
     return grey, pixels[..., 3:].min(axis=2, initial=255) == 255
