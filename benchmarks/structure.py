@@ -10,7 +10,8 @@ change their number. A *name
 imported between families* is one name in an import statement from one planner family in another;
 files directly in ``planners/`` are the room's doors and belong to no family. A *circle* is a set of
 modules that import each other in a loop, imports inside functions counted too. A *kernel* is a
-function that Numba compiles.
+function that Numba compiles. A conditional expression is *long* if it holds another one, spans
+lines or has more than 60 characters.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ import yaml
 from benchmarks.reporting import command_line
 
 MANY_ARGUMENTS = 10
+LONGEST_CHOICE = 60
+"""Characters of a conditional expression that is read at a glance."""
 ROOT = Path(__file__).resolve().parent.parent
 LIMITS = ROOT / "benchmarks" / "reference" / "structure.yaml"
 
@@ -92,6 +95,17 @@ def packed_assignments(module: Module) -> int:
         and isinstance(node.value, ast.Tuple)
         and any(isinstance(target, ast.Tuple) for target in node.targets)
         for node in ast.walk(module.tree)
+    )
+
+
+def long_choices(module: Module) -> int:
+    """Conditional expressions that are no short choice between two short values."""
+    choices = [node for node in ast.walk(module.tree) if isinstance(node, ast.IfExp)]
+    return sum(
+        one.lineno != one.end_lineno
+        or len(ast.unparse(one)) > LONGEST_CHOICE
+        or any(isinstance(node, ast.IfExp) for node in ast.walk(one) if node is not one)
+        for one in choices
     )
 
 
@@ -189,6 +203,7 @@ def measure(folder: Path) -> tuple[dict[str, str], list[str]]:
         "names imported between planner families": str(sum(crossing.values())),
         "circles": str(len(loops)),
         "assignments of a tuple to a tuple": str(sum(map(packed_assignments, modules))),
+        "long conditional expressions": str(sum(map(long_choices, modules))),
     }
     figures |= {name: str(count) for name, count in mechanisms(modules, folder).items()}
     for room, lines in sorted(rooms.items()):

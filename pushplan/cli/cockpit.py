@@ -128,7 +128,7 @@ class Cockpit:
         """Show the final scores until the person has had enough.
 
         Returns:
-            Whether to start again.
+            True to start again.
         """
         self._display.keyboard.clear()
         self._show(self._env.world, [*closing_lines(episode), "r starts again   q ends"])

@@ -37,8 +37,8 @@ def kernel(function: Any = None, *, allocates: bool = False, inline: bool = Fals
 
     Args:
         function: plain Python over numbers, arrays and named tuples of them.
-        allocates: whether it, or a function that it calls, makes arrays.
-        inline: whether the compiler puts its code in the place of each call.
+        allocates: it, or a function that it calls, makes arrays.
+        inline: the compiler puts its code in the place of each call.
     """
     if function is None:
         return partial(_compiled, allocates=allocates, inline=inline)

@@ -25,8 +25,8 @@ class Entry:
         label: what it is.
         fill: colour inside; None for an outline or a line.
         edge: colour of the outline, or of the line.
-        line: whether it is a line.
-        dashed: whether that is dashed.
+        line: it is a line, not an area.
+        dashed: the line is dashed.
     """
 
     label: str
@@ -49,9 +49,9 @@ def legend_of(
     Args:
         world: the scene.
         plan: that is drawn; True for one that predicts pushes.
-        trail: whether the robot's path so far is drawn.
-        object_trails: whether those of the objects are.
-        pushes: whether numbered pushes are.
+        trail: the robot's path so far is drawn.
+        object_trails: those of the objects are drawn.
+        pushes: numbered pushes are drawn.
     """
     palette = palette_of(world)
     objects = world.movables

@@ -133,7 +133,7 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         """Change to the first action mode of the task that takes a `Twist`, for the next reset.
 
         Returns:
-            Whether the mode has changed: it does not where it was asked for by name, or takes
+            True if the mode has changed: it does not where it was asked for by name, or takes
             velocities already.
         """
         if not self._may_adapt or self._mode.takes_velocities:

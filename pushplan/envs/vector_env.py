@@ -49,8 +49,7 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
         env_fns: make the environments; all have the same spaces, whose elements are arrays.
         workers: processes among which the environments are divided; no more than there are
             environments.
-        copy: whether `step` and `reset` return observations of their own, which later steps do not
-            change.
+        copy: `step` and `reset` return observations of their own, which later steps do not change.
         autoreset_mode: as in `gymnasium.vector.SyncVectorEnv`.
 
     Attributes:

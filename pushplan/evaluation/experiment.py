@@ -75,7 +75,7 @@ class Experiment:
         traces: which recorded episodes are kept: ``"all"``, ``"failures"`` (those without success)
             or ``"none"``. Metrics of one's own, replays and `rescore` need them.
         only: name of a suite -> labels of the policies that run on it; all that fit by default.
-        allow_misfits: whether a policy that fits no suite is left out; else it is refused.
+        allow_misfits: leave out a policy that fits no suite; else it is refused.
         skipped: (suite, policy label) -> why that pair is not run.
 
     Raises:

@@ -91,7 +91,7 @@ def solve_exactly(
     """The cheapest tour.
 
     Returns:
-        Whether it got to its end, and the nodes in visiting order; None if no tour is finite or it
+        True if it got to its end, and the nodes in visiting order; None if no tour is finite or it
         was stopped.
     """
     others = problem.members

@@ -27,7 +27,7 @@ class GtspConfig(CheckedFields):
         iterations: rounds of the search where the stop rule sets no limit.
         exact_clusters: clusters that ``"auto"`` takes to dynamic programming at most.
         memory_mb: of a table of dynamic programming at most [MB].
-        lower_bound: whether to spend time on a lower bound and a proof.
+        lower_bound: spend time on a lower bound and a proof.
         proof_fraction: of a time budget that the proof may take.
         blink: fraction of places that an insertion overlooks (Christiaens and Vanden Berghe 2020).
         hot: temperature at the beginning of a run from a random order.

@@ -214,7 +214,7 @@ def warm_up_solver(proof: bool = True) -> None:
     """Solve a small instance in every way, so that later calls find compiled kernels.
 
     Args:
-        proof: whether also with a lower bound.
+        proof: also with a lower bound.
     """
     costs = np.random.default_rng(0).random((14, 14))
     clusters = [range(2 * c, 2 * c + 2) for c in range(7)]

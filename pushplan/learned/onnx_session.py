@@ -79,7 +79,7 @@ class Network:
         Args:
             seen: the observation, without batch axis.
             noise: for the input ``noise``, where the network has one.
-            timed: whether to stop it after `LONGEST_DECISION_S`; a network that has kept it once
+            timed: stop it after `LONGEST_DECISION_S`; a network that has kept it once
                 need not be watched.
 
         Raises:

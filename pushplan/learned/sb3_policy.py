@@ -40,7 +40,7 @@ class Sb3Policy(NetworkPolicy):
 
     Args:
         path: the ``.zip`` file.
-        trust: whether its pickles may run. Loading a pickle runs whatever its author wrote. By
+        trust: let its pickles run. Loading a pickle runs whatever its author wrote. By
             default the environment variable ``PUSHPLAN_TRUST_PICKLES=1`` decides.
         label: what errors call it; the file's name by default.
 

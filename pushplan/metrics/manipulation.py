@@ -143,7 +143,7 @@ def efficiency(tree_m: float, driven_m: float, *, everything: bool) -> float:
     Args:
         tree_m: L*(O') [m].
         driven_m: l_0 [m].
-        everything: whether all sub-tasks were completed.
+        everything: all sub-tasks were completed.
     """
     if math.isinf(tree_m):
         return math.nan
@@ -171,7 +171,7 @@ def effort(
         shortest: (K,) l_i* of the completed objects [m], 0 for the others.
         lengths: (K,) l_i [m].
         driven_m: l_0 [m].
-        bounded: whether to do so; the original's code does not.
+        bounded: do so; the original's code does not.
     """
     masses = world.movables.masses
     work = float(masses @ lengths)

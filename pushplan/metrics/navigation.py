@@ -19,7 +19,7 @@ class NavigationScores:
     """Scores of a robot that drives to its goal among things that it may push.
 
     Args:
-        success: whether the goal was reached.
+        success: the goal was reached.
         efficiency: E_nav in [0, 1]: shortest length over driven length, 0 without success.
         effort: I_nav in [0, 1]: the robot's own work over all work; 1 if nothing was pushed.
         path_length_m: l_0, length of the robot's path [m].

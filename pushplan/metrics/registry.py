@@ -43,8 +43,8 @@ class Metric:
         digits: after the point, in tables.
         if_failed: its value for a job that failed; None for no value. A score that cannot fall
             below this has one, so that failures do not raise the mean.
-        until_failure: whether what was recorded before a job failed still counts.
-        whole: whether values are whole numbers.
+        until_failure: what was recorded before a job failed still counts.
+        whole: values are whole numbers.
         low: least value that it can have.
         high: greatest value that it can have.
     """

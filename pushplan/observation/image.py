@@ -25,8 +25,8 @@ class ImageObservation(CheckedFields):
         channels: names from `pushplan.observation.CHANNELS`, in the order of the result.
         window: height and width of what is seen [m].
         pixels: rows and columns.
-        north_up: whether the image keeps the world's axes, with +y up and +x to the right,
-            instead of turning with the robot.
+        north_up: keep the world's axes, with +y up and +x to the right, instead of turning with
+            the robot.
         shift: how far the middle of the window lies up the image from the robot [m]; a positive
             shift shows more of what is ahead.
 

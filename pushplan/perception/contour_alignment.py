@@ -47,7 +47,7 @@ def align(
         expected: (G,) headings [rad].
         variances: (G,) of one coordinate of a seen corner [m²], positive.
         spreads: (G,) standard deviations of the headings about the expected ones [rad].
-        sampled: whether the points are samples, which correspond only nearly.
+        sampled: the points are samples, which correspond only nearly.
     """
     count = shapes.shape[1]
     each = np.arange(len(shapes))

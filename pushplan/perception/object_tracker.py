@@ -49,7 +49,7 @@ class ObjectTracker:
         acceleration: standard deviation of accelerations of objects [m/s²]; less smooths more.
         turn_acceleration: the same of turning [rad/s²].
         density: of objects, for their masses [kg/m²].
-        wheeled: whether they stand on casters.
+        wheeled: they stand on casters.
 
     Attributes:
         time: of the newest snapshot [s]; None before the first.

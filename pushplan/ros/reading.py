@@ -117,8 +117,8 @@ def _driven(
     Args:
         poses: (N, 3) of the path.
         robot: who drives it.
-        backs_up: whether steps against the heading are driven back; without times the headings of
-            a path may say nothing of that.
+        backs_up: steps against the heading are driven back; without times the headings of a path
+            may say nothing of that.
     """
     lengths = np.diff(arc_lengths(poses))
     turns = (np.diff(poses[:, 2]) + np.pi) % (2.0 * np.pi) - np.pi

@@ -40,7 +40,7 @@ class Command:
         plan: what is followed; None for policies without one.
         plan_age: time since that plan was taken up [s].
         world_age: time since the newest world was seen [s].
-        late: whether the call came more than half a period after it was due.
+        late: the call came more than half a period after it was due.
     """
 
     time: float

@@ -245,7 +245,7 @@ class Runner:
             world: what perception has seen; ``world.time`` says when.
 
         Returns:
-            Whether it is news. One that is not later than the newest is counted and ignored.
+            True if it is news. One that is not later than the newest is counted and ignored.
         """
         world = self._allowance.planning_world(world)
         with self._lock:
@@ -314,7 +314,7 @@ class Runner:
             timeout: how long to wait for the call that runs [s].
 
         Returns:
-            Whether no planning thread is left.
+            True if no planning thread is left.
         """
         self.cancel("closed")
         if self._prompt:

@@ -97,7 +97,7 @@ class ThreadExecutor:
             timeout: how long to wait for that [s].
 
         Returns:
-            Whether no thread is left.
+            True if no thread is left.
         """
         self.abandon()
         return self._worker.end(timeout)
@@ -142,7 +142,7 @@ class ThreadCall(Generic[T]):
         began: when it was asked for, by the clock of the executor [s].
 
     Attributes:
-        ended: whether it is over, in whatever way.
+        ended: it is over, in whatever way.
     """
 
     def __init__(self, call: Callable[[Stop], T], stop: Stop, began: float) -> None:

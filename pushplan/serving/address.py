@@ -42,7 +42,7 @@ class Address:
 
         Args:
             text: the address. An IPv6 address stands in brackets; ``localhost`` is 127.0.0.1.
-            allow_remote: whether other machines may reach it, too.
+            allow_remote: let other machines reach it, too.
 
         Raises:
             InvalidInputError: if it is neither, or other machines would reach it.

@@ -68,7 +68,7 @@ def error(message: str, request: str | None = None, *, closing: bool = False) ->
     Args:
         message: what is wrong; put on one line of 300 characters at most.
         request: type of the message that is wrong, if it is known.
-        closing: whether the server ends the connection.
+        closing: the server ends the connection.
     """
     return encode(
         {"type": "error", "message": one_line(message), "request": request, "closing": closing}

@@ -57,8 +57,8 @@ class PolicyServer:
         policy: the name of one of `pushplan.planners.policy_names()`, or a callable that makes a
             policy which acts by the world alone.
         address: ``"unix:PATH"`` or ``"tcp:127.0.0.1:PORT"``; port 0 takes a free one.
-        allow_remote: whether other machines may reach the address. Nothing is encrypted and nobody
-            is asked for a password.
+        allow_remote: let other machines reach the address. Nothing is encrypted and nobody is asked
+            for a password.
         limits: what clients may take.
         label: what clients are told that the policy is called.
 
@@ -153,7 +153,7 @@ class PolicyServer:
         """Cut all clients off and end; planning calls have five seconds to return.
 
         Returns:
-            Whether no thread is left.
+            True if no thread is left.
         """
         if self._thread is None:
             return True
@@ -173,7 +173,7 @@ class PolicyServer:
             ready: called when clients can connect.
 
         Returns:
-            Whether no thread is left.
+            True if no thread is left.
 
         Raises:
             InvalidInputError: as `start`.

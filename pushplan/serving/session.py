@@ -41,9 +41,9 @@ class Session:
     """A client's policy and episode. All but `abandon` is called one after another.
 
     Attributes:
-        greeted: whether the client has said hello.
-        busy: whether a message is being answered.
-        abandoned: whether planning was ended from outside, so that what is answered is void.
+        greeted: the client has said hello.
+        busy: a message is being answered.
+        abandoned: planning was ended from outside, so that what is answered is void.
 
     Args:
         make_policy: makes the client's own policy.

@@ -49,14 +49,14 @@ class Movables(ArrayRecord, CheckedFields):
         poses: (K, 3) x, y [m] and theta [rad], world frame.
         twists: (K, 3) velocities in the world frame [m/s, m/s, rad/s].
         masses: (K,) masses as the metrics count them [kg], positive.
-        wheeled: (K,) whether the object stands on casters and rolls.
+        wheeled: (K,) True where the object stands on casters and rolls.
         drawn_vertices: (V, 2) convex outlines as drawn, in body frames, flattened [m];
             `convex_outline` says what is taken.
         drawn_offsets: (K + 1,) where each outline starts in ``drawn_vertices``.
         contact_radii: (K,) distances from the drawn outlines at which objects touch others [m]:
             they are rounded by them. `vertices` are grown by them, and everything but masses,
             goals and files reads those.
-        fixed: (K,) whether the object is held not to move, as far as one knows; all false if
+        fixed: (K,) True where the object is held not to move, as far as one knows; all false if
             None. Planners count it as static (`World.with_fixed_as_static`); in a simulator's own
             world it is the truth.
 

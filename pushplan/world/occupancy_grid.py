@@ -59,7 +59,7 @@ def occupancy_polygons(
         full: (rows, columns) cells that are obstacles.
         resolution: side of a cell [m].
         origin: (2,) or (3,) x, y [m] and theta [rad] of the corner of cell (0, 0).
-        beyond: whether what the box holds beyond a rotated grid is an obstacle too.
+        beyond: what the box holds beyond a rotated grid is an obstacle too.
 
     Returns:
         Polygons, each (N, 2) [m], and x_min, y_min, x_max, y_max [m].

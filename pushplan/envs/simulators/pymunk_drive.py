@@ -35,7 +35,7 @@ class PymunkOptions(CheckedFields):
         decay: fraction of its speed that a rolling or floating object may lose in one substep.
         iterations: sweeps of the contact solver in each substep.
         samples: poses recorded in each call of `PymunkSimulator.step`, at even intervals.
-        holds_direction: whether the robot keeps the direction in the world that it had when a
+        holds_direction: the robot keeps the direction in the world that it had when a
             command began, and turns beside that, as in the code of the 2D benchmark; else its
             velocity turns with it, on an arc.
     """

@@ -39,11 +39,11 @@ class StepOutcome:
 
     Args:
         reward: as the task defines it.
-        success: whether the goal is reached.
+        success: the goal is reached.
         reason: why the episode ends, ``""`` while it goes on.
-        terminated: whether the episode is over for the task.
-        truncated: whether it was cut off.
-        completed: (K,) whether the sub-task of each object of the start is done now; None where
+        terminated: the episode is over for the task.
+        truncated: it was cut off.
+        completed: (K,) True where the sub-task of an object of the start is done now; None where
             the goal is one for the robot itself.
     """
 
@@ -234,7 +234,7 @@ class Task(ABC):
             before: the world when the step began.
             after: the world when it ended, without the objects that have left the floor.
             work: sum over the objects of mass times path length in this step [kg m].
-            touched_static: whether the robot touched something static.
+            touched_static: the robot touched something static.
         """
 
     def _driven(self, reward: float, after: World, *, failure: str = "") -> StepOutcome:

@@ -94,9 +94,8 @@ class FreeSpace:
             within: (4,) x_min, y_min, x_max, y_max of the centres [m]; the map's bounds if None.
             allowed: which centres (N, 2) [m] may be used, beyond all that.
             robot: Shapely geometries that squares stay off, too.
-            touching: whether squares may touch the robot instead: they are placed as if it were not
-                there, and those that overlap it are moved straight away from its middle until they
-                touch.
+            touching: let squares touch the robot instead: they are placed as if it were not there,
+                and those that overlap it are moved straight away from its middle until they touch.
 
         Raises:
             ScenarioError: if there is no room for them.

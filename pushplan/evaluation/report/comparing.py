@@ -47,7 +47,7 @@ class Rule:
 
     Attributes:
         metric: the column.
-        above: whether a change above the bound is one; else below.
+        above: a change above the bound is one; else a change below it.
         bound: in the column's unit, or a fraction of the old mean if ``relative``.
         relative: see there.
     """
@@ -73,7 +73,7 @@ class Verdict:
         policy: label.
         setting: the scenarios without their seeds.
         count: scenarios compared; of the smaller run where they are not paired.
-        paired: whether both runs have these scenarios.
+        paired: both runs have these scenarios.
         old: mean before.
         new: mean now; NaN if the new run has no such values.
         change: new minus old, divided by the old mean for a relative rule.

@@ -67,7 +67,7 @@ class Results(StoredRun):
 
         Args:
             wide: with medians and further columns, for files and pages.
-            settings: whether each of several settings has its own tables too.
+            settings: add the tables of each of several settings.
             pairs: as for `compare`.
         """
         titles = self.titles

@@ -39,7 +39,7 @@ def misfits(
         suites: what they are to run.
         settings: of the environments.
         only: labels of the policies that a suite, by name, is for; else for all of them.
-        allow_all: whether a policy may fit no suite at all.
+        allow_all: let a policy fit no suite at all.
 
     Returns:
         (suite, label) -> why that policy can run none of the suite's scenarios.

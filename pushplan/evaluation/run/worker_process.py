@@ -48,7 +48,7 @@ class WorkerDiedError(PushplanError):
     Attributes:
         log: what it had written to its standard error.
         status: of the job that it ran.
-        from_outside: whether somebody else may have killed it.
+        from_outside: somebody else may have killed it.
     """
 
     def __init__(

@@ -231,7 +231,7 @@ class StoredResult:
     Attributes:
         row: the row.
         spec: what `job_spec` said about its job.
-        current: whether it is the one that counts for its policy and scenario.
+        current: it is the one that counts for its policy and scenario.
         measured: metric, its source and its value, of metrics that are no columns.
     """
 

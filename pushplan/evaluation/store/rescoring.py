@@ -37,7 +37,7 @@ def rescore(path: str | Path, metrics: Sequence[str] = (), *, columns: bool = Tr
         metrics: further ones, kept beside the rows: names of `pushplan.metrics`, or functions as
             ``"module:function"`` or ``"file.py:function"``. One that is there already and whose
             file has not changed is not computed again.
-        columns: whether the columns are computed again, too.
+        columns: compute the columns again, too.
 
     Raises:
         UnknownNameError: if there is no such metric.

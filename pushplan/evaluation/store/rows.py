@@ -81,7 +81,7 @@ class ResultRow:
         seed: seed of the scenario.
         status: a value of `Status`.
         reason: why the episode ended; for a failed job what went wrong.
-        success: whether the task's goal was reached.
+        success: the task's goal was reached.
         metrics: values by name; a metric without a value is left out.
         wall_time_s: time that the episode took [s].
         plan_calls: planning calls; empty for a policy that keeps no log of them.

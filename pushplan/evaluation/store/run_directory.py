@@ -65,7 +65,7 @@ class RunDirectory:
 
     Args:
         path: the folder.
-        new: whether it may be one without results.
+        new: it may be one without results.
 
     Raises:
         InvalidInputError: if another process is writing there, or there are no results.
@@ -165,7 +165,7 @@ class RunDirectory:
             trace: the recorded episode.
             detail: traceback of a failure.
             spec: what `job_spec` said about the job.
-            show: whether it is the result that counts for its policy and scenario.
+            show: it is the result that counts for its policy and scenario.
 
         Returns:
             The row as it is stored: with the name of its trace.

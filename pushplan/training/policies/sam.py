@@ -34,7 +34,7 @@ class SpatialActionPolicy(DQNPolicy):
 
     Args:
         arguments: of the library.
-        averaged: whether the target is the policy, which follows the network that learns.
+        averaged: the target is the policy, which follows the network that learns.
         options: of the library.
     """
 

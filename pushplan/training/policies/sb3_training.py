@@ -60,7 +60,7 @@ class Sb3Learner:
     Args:
         config: what is trained.
         device: of PyTorch.
-        processes: whether each environment has a process of its own.
+        processes: give each environment a process of its own.
         logs: folder for TensorBoard.
     """
 

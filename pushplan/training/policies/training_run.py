@@ -69,7 +69,7 @@ class TrainingRun:
     Args:
         folder: where everything is kept.
         config: what is trained. A folder that holds another training is refused.
-        resume: whether to go on with what is in the folder.
+        resume: go on with what is in the folder.
 
     Raises:
         InvalidInputError: if the folder holds a training and ``resume`` is false, or another one.

@@ -52,9 +52,9 @@ class Episode(ArrayRecord, CheckedFields):
         robot_poses: (T + 1, 3) x, y [m], theta [rad].
         object_poses: (T + 1, K, 3), in the order of ``world.movables``; an object that has left
             the floor keeps its last pose.
-        success: whether the task's goal was reached.
+        success: the task's goal was reached.
         reason: why the episode ended, such as ``"goal"``, ``"wall"`` or ``"time_limit"``.
-        completed: (K,) whether the sub-task of each object was done; all false by default.
+        completed: (K,) True where the sub-task of an object was done; all false by default.
         actions: (S, A) what was sent to the environment in each of its S steps.
         rewards: (S,) reward of each step.
         act_times_s: (S,) wall-clock time of each call of the policy [s].
