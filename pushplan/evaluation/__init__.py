@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from pushplan.evaluation.report.results import Results
     from pushplan.evaluation.run.batch import run_batch
     from pushplan.evaluation.run.jobs import Job, JobResult, JobSettings
+    from pushplan.evaluation.run.policy_calls import InvalidActionError, PolicyError
     from pushplan.evaluation.run.policy_specs import (
         PolicySpec,
         UnusablePolicyError,
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
         parse_policies,
         parse_policy,
     )
-    from pushplan.evaluation.run.recording import InvalidActionError, PolicyError, run_episode
+    from pushplan.evaluation.run.recording import run_episode
     from pushplan.evaluation.run.reproduction import Reproduction, reproduce
     from pushplan.evaluation.statistics.estimates import (
         Estimate,
@@ -93,7 +94,8 @@ __getattr__, __dir__ = lazy_names(
         "benchmark": "bench",
         "report.comparing": "Rule Verdict compare_runs",
         "store.database": "DamagedResultsError",
-        "run.recording": "InvalidActionError PolicyError run_episode",
+        "run.policy_calls": "InvalidActionError PolicyError",
+        "run.recording": "run_episode",
         "experiment": "Experiment",
         "run.jobs": "Job JobResult JobSettings",
         "store.merging": "Merged merge",

@@ -24,7 +24,7 @@ def take_lock(file: IO[str] | int, *, shared: bool = False, posix: bool = False)
     Args:
         file: the open file; the lock ends when it is closed.
         shared: let others share the lock.
-        posix: take a lock of the kind that SQLite uses, not that of `flock`.
+        posix: take a lock of the kind that SQLite uses; on Linux those of `flock` do not see it.
 
     Returns:
         True if this process holds the lock now, False if another one does, None if there are no
@@ -48,10 +48,12 @@ def is_locked(path: Path, *, posix: bool = False) -> bool | None:
         posix: as for `take_lock`.
     """
     try:
+        # a pipe in its place would wait for somebody who writes
         handle = os.open(path, os.O_RDONLY | NO_FOLLOW | getattr(os, "O_NONBLOCK", 0))
     except OSError:
         return False
     try:
+        # an exclusive POSIX lock needs a file that is open for writing
         free = take_lock(handle, shared=True, posix=posix)
     finally:
         os.close(handle)

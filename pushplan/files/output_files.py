@@ -22,7 +22,8 @@ def replacing(path: Path) -> Iterator[IO[bytes]]:
 
     A file of that name is replaced. So is a link, which is not followed.
     """
-    # nobody can lay a link at a name that cannot be guessed, and "x" would refuse it
+    # nobody can lay a link at a name that cannot be guessed, and "x" would refuse it; it is in the
+    # same folder because `os.replace` takes one instant only within a disk
     temporary = path.with_name(f".pushplan-{secrets.token_hex(8)}.tmp")
     try:
         with temporary.open("xb") as file:
@@ -74,5 +75,5 @@ def make_folder(path: Path) -> None:
         InvalidInputError: if there is a link in its place.
     """
     path.mkdir(parents=True, exist_ok=True)
-    if path.is_symlink():
+    if path.is_symlink():  # one to a folder is no error of `mkdir`
         raise InvalidInputError(f"{path} is a link, which is not followed: put the folder there")

@@ -32,6 +32,9 @@ MAX_TEXT = 32_000_000
 MAX_VALUES = 1_000_000
 """Most values in a JSON file."""
 _MEMBERS = 1000
+"""Most arrays in a file."""
+_PIECE_BYTES = 2**20
+"""Bytes that are read at a time from an array in a file."""
 _TEXT = re.compile(rb'"[^"\\]*(?:\\.[^"\\]*)*(?:"|\\?\Z)', re.DOTALL)
 """A text in JSON; one that does not end reaches to the end of all, else searching is quadratic."""
 _STEPS = np.zeros(256, dtype=np.int8)
@@ -64,7 +67,7 @@ def read_bytes(path: str | Path, what: str = "file", limit: int = MAX_BYTES) -> 
                 raise OSError(
                     0, f"it has {status.st_size:,} bytes, {limit:,} are the greatest size"
                 )
-            return file.read(status.st_size)
+            return file.read(status.st_size)  # no more, should it grow meanwhile
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error
         raise SchemaError(f"cannot read {what} {path}: {why}") from error
@@ -151,7 +154,7 @@ def read_npz(
             raise SchemaError(f"it has more than {_MEMBERS} members")
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
-            if len(members) < len(archive.infolist()):
+            if len(members) < len(archive.infolist()):  # readers differ in which of two they take
                 raise SchemaError("an array is there twice")
             if members and members.keys().isdisjoint(required):
                 raise SchemaError(f"it holds {', '.join(map(short, [*members][:3]))}: no {what}")
@@ -162,7 +165,7 @@ def read_npz(
                     raise SchemaError(f"{name!r} must be stored or deflated")
                 with archive.open(info) as member:
                     arrays[name] = _array(member, limit)
-                limit -= arrays[name].nbytes
+                limit -= arrays[name].nbytes  # one limit for all arrays together
             return arrays
     except SchemaError as error:
         raise SchemaError(f"cannot read {what} {path}: {error}") from error
@@ -220,11 +223,12 @@ def _array(file: IO[bytes], limit: int) -> NDArray[Any]:
     room = values.view(np.uint8)
     filled = 0
     while filled < room.size:
-        got = file.readinto(room[filled : filled + 2**20])  # type: ignore[attr-defined]
+        got = file.readinto(room[filled : filled + _PIECE_BYTES])  # type: ignore[attr-defined]
         if not got:
             raise SchemaError(f"an array of shape {shape} needs {size:,} bytes, got {filled:,}")
         filled += got
     if kind.kind == "U" and values.size:
+        # NumPy keeps four bytes a character and fails late where they are none
         codes = values.view(np.dtype(np.uint32).newbyteorder(kind.byteorder))
         if int(codes.max(initial=0)) > sys.maxunicode:
             raise SchemaError(f"a text holds {codes.max():#x}, which is no character")
@@ -242,6 +246,7 @@ def _check_json(data: bytes) -> None:
             codes = np.frombuffer(b" %b " % text, dtype=np.uint8)
             steps = _STEPS[codes]
             depth = int(np.cumsum(steps[steps != 0], dtype=np.int64).max(initial=0))
+            # the longest row of digits lies between two neighbours that are none
             others = np.flatnonzero(_NO_DIGITS[codes])
             digits = int((others[1:] - others[:-1]).max()) - 1
         if count <= MAX_VALUES and depth <= MAX_DEPTH and digits < LONGEST_NUMBER:

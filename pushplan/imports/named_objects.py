@@ -91,7 +91,7 @@ def _fresh_modules() -> Iterator[None]:
     try:
         yield
     finally:
-        for name, module in [*sys.modules.items()]:
+        for name, module in [*sys.modules.items()]:  # a copy: other threads import meanwhile
             if module is before.get(name):
                 continue
             file = getattr(module, "__file__", None)
@@ -134,6 +134,7 @@ def _load_file(path: Path) -> ModuleType:
         raise InvalidInputError(f"there is no file {path}")
     _use_folder(str(path.parent))
     source = path.read_bytes()
+    # files in two folders may share a name, and an edited one is another module
     digest = hashlib.sha256(str(path).encode() + b"\0" + source).hexdigest()[:8]
     name = f"pushplan_user_{path.stem}_{digest}"
     if name in sys.modules:
@@ -141,10 +142,11 @@ def _load_file(path: Path) -> ModuleType:
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
+    sys.modules[name] = module  # before it runs: its dataclasses look their module up there
     try:
+        # what was hashed, even if the file has changed since
         exec(compile(source, path, "exec"), module.__dict__)
     except BaseException:
-        del sys.modules[name]
+        del sys.modules[name]  # else the next call would get what is half made
         raise
     return module

@@ -136,7 +136,7 @@ def look_up(kind: str, table: Mapping[str, str], name: object) -> Any:
         UnknownNameError: if it is not in the table; the message calls it a ``kind``.
         MissingDependencyError: if a library that it needs is not installed.
     """
-    if not isinstance(name, str) or name not in table:
+    if not isinstance(name, str) or name not in table:  # a list, say, cannot be asked for
         raise UnknownNameError(kind, name, table)
     module, _, attribute = table[name].partition(":")
     return getattr(need(module), attribute)

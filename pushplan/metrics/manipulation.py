@@ -15,6 +15,9 @@ from pushplan.world import ClearanceArea, Episode, Receptacle, StaticMap, World
 from pushplan.world.checks import BoolArray, FloatArray
 from pushplan.world.outline import centroid
 
+EDGE_PLACES = 10
+"""Places on every edge of a clearance area that the original's code takes for the goal."""
+
 
 @dataclass(frozen=True)
 class ManipulationScores:
@@ -65,7 +68,7 @@ def manipulation_scores(episode: Episode, *, reference: bool = False) -> Manipul
     """
     done = _completed(episode)
     fraction = s_manip(episode)
-    needed = done & ~episode.world.completed
+    needed = done & ~episode.world.completed  # what was done at the start needs no path
     shortest = shortest_lengths(episode.world, needed, reference=reference)
     tree = tree_length(episode.world, needed, reference=reference)
     driven = robot_path_length(episode)
@@ -179,8 +182,8 @@ def effort(
         return 1.0
     own = world.robot.mass * driven_m
     needed = float(masses @ (np.minimum(shortest, lengths) if bounded else shortest))
-    share = (own + needed) / (own + work)
-    return min(1.0, share) if bounded else share
+    fraction = (own + needed) / (own + work)
+    return min(1.0, fraction) if bounded else fraction  # rounding may pass 1
 
 
 def _completed(episode: Episode) -> BoolArray:
@@ -192,8 +195,9 @@ def _reference_ends(goal: Receptacle | ClearanceArea) -> FloatArray:
     """(N, 2) places [m] that the original's code takes for the goal."""
     if isinstance(goal, Receptacle):
         return centroid(goal.polygon)[None]
-    shares = (np.arange(10) + 0.5)[:, None, None] / 10.0
-    ends: FloatArray = goal.polygon + shares * (np.roll(goal.polygon, -1, axis=0) - goal.polygon)
+    fractions = (np.arange(EDGE_PLACES) + 0.5)[:, None, None] / EDGE_PLACES
+    edges = np.roll(goal.polygon, -1, axis=0) - goal.polygon
+    ends: FloatArray = goal.polygon + fractions * edges
     return ends.reshape(-1, 2)
 
 
@@ -219,7 +223,7 @@ def i_manip_reference(episode: Episode) -> float:
 
 
 def i_manip(episode: Episode) -> float:
-    """I_manip of an episode."""
+    """I_manip of an episode; without the spanning tree, which takes longest."""
     needed = _completed(episode) & ~episode.world.completed
     shortest = shortest_lengths(episode.world, needed)
     return effort(episode.world, shortest, object_path_lengths(episode), robot_path_length(episode))

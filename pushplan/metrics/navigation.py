@@ -112,12 +112,12 @@ def e_nav(episode: Episode) -> float:
 def e_nav_to_goal_point(episode: Episode) -> float:
     """E_nav with l_0* measured to the goal's centre, to be set beside the paper's tables."""
     if not episode.success:
-        return 0.0
+        return 0.0  # as in `e_nav`
     return navigation_scores(episode, to_goal_point=True).efficiency
 
 
 def i_nav(episode: Episode) -> float:
-    """I_nav of an episode."""
+    """I_nav of an episode; without the shortest path, which takes longest."""
     length = robot_path_length(episode)
     work = interaction_work(episode)
     return effort(episode.world.robot.mass, length, work)

@@ -13,6 +13,9 @@ from pushplan.world.polyline import turn_acceleration
 from pushplan.world.scene import World
 from pushplan.world.stop import AnyOf, Stop, StopCheck, check_rules, wants_own_budget
 
+_ROUNDING = 1e-6
+"""Fraction of a limit by which differences of a plan's rates may exceed it."""
+
 
 class PlanningCall:
     """One call of a planner, from the time when this object is made.
@@ -39,7 +42,7 @@ class PlanningCall:
         self.has_rule = not own
         """True if a rule of the caller takes the place of the planner's own budget."""
         self._rule = given
-        if own and default is not None:  # a rule that only cancels leaves the planner its budget
+        if own and default is not None:  # `OwnBudget` in a rule stands for the default
             self._rule = default if given is None else AnyOf((given, default))
         self.arm()
 
@@ -81,7 +84,7 @@ class PlanningCall:
         robot = self.world.robot
         if plan is not None and not robot.can_stop:
             fastest = turn_acceleration(plan.turn_rates[:-1], np.diff(plan.times))
-            if fastest > robot.max_turn_acceleration * (1.0 + 1e-6):
+            if fastest > robot.max_turn_acceleration * (1.0 + _ROUNDING):
                 status = PlanStatus.PATH_ONLY
         stats = PlanStats(self.elapsed, first_solution_s, iterations, nodes, detail)
         return PlanResult(status, plan, stats)

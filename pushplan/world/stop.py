@@ -19,6 +19,9 @@ from pushplan.errors import InvalidInputError
 from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, NonNegativeInt
 from pushplan.world.checks import expect
 
+_WITHOUT_PLAN = 3
+"""Default budgets that a planner may spend on its first plan."""
+
 
 class StopCheck(Protocol):
     """A rule that has been armed for one planning call."""
@@ -42,7 +45,7 @@ class Stop(ABC):
 
     def __or__(self, other: Stop) -> Stop:
         if not isinstance(other, Stop):
-            return NotImplemented
+            return NotImplemented  # Python then raises the TypeError of an operator
         return AnyOf((*rules_of(self), *rules_of(other)))
 
     @property
@@ -100,7 +103,8 @@ class DefaultBudget(Stop):
 
     def start(self) -> StopCheck:
         """Arm the rule for one call."""
-        return lambda done, cost: done >= self.iterations * (3 if cost == math.inf else 1)
+        longest = _WITHOUT_PLAN * self.iterations
+        return lambda done, cost: done >= (longest if cost == math.inf else self.iterations)
 
 
 @dataclass(frozen=True)

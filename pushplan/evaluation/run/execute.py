@@ -26,14 +26,14 @@ from pushplan.evaluation.run.jobs import (
     failed_result,
     timeout_reason,
 )
-from pushplan.evaluation.run.policy_specs import UnusablePolicyError
-from pushplan.evaluation.run.recording import (
+from pushplan.evaluation.run.policy_calls import (
     InvalidActionError,
     PolicyError,
-    Recording,
     asked,
     plan_times,
 )
+from pushplan.evaluation.run.policy_specs import UnusablePolicyError
+from pushplan.evaluation.run.recording import Recording
 from pushplan.evaluation.store.rows import Status, blank_row, clean_reason, instant, scored_row
 from pushplan.world import InvalidInputError, MissingDependencyError
 from pushplan.world.policy_abilities import (

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from pushplan.errors import describe
+from pushplan.evaluation.run.policy_calls import wanted_observation
 from pushplan.evaluation.run.policy_specs import PolicySpec
-from pushplan.evaluation.run.recording import wanted_observation
 from pushplan.evaluation.store.rows import ResultRow, Status, blank_row, checked_row, clean_reason
 from pushplan.imports.named_objects import load_object
 from pushplan.world import ChecksEnvironment, ChoosesActions, InvalidInputError, Policy

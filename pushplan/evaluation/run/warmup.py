@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from pushplan.evaluation.run.jobs import JobSettings
+from pushplan.evaluation.run.policy_calls import PolicyError
 from pushplan.evaluation.run.policy_specs import PolicySpec, policy_names
-from pushplan.evaluation.run.recording import PolicyError, Recording
+from pushplan.evaluation.run.recording import Recording
 from pushplan.metrics import compute
 from pushplan.world import InvalidInputError, UnknownNameError
 

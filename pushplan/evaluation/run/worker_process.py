@@ -13,13 +13,14 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from pushplan.evaluation.run.job_limits import WORKER_VARIABLE
 from pushplan.evaluation.run.jobs import BatchStoppedError, JobResult
+from pushplan.evaluation.run.process_tree import descendants, marked, memory_kb, process_group
 from pushplan.evaluation.run.worker import THREAD_VARIABLES, WorkerSetup
 from pushplan.evaluation.store.rows import ResultRow, Status
 from pushplan.files.file_locks import NO_FOLLOW
@@ -27,10 +28,10 @@ from pushplan.imports.named_objects import import_path
 from pushplan.world import PushplanError
 
 _POLL_S = 0.2
-_CHUNK = 2**18
-_LONGEST_MESSAGE = 2**30
-_LOG_TAIL = 6000
-_LOG_MOST = 1_000_000
+_CHUNK_BYTES = 2**18
+_LONGEST_MESSAGE_BYTES = 2**30
+_LOG_TAIL_BYTES = 6000
+_LONGEST_LOG_BYTES = 1_000_000
 _TRACE_S = 0.2  # time that a worker has to write where it hangs before it is ended
 _FAREWELL_S = 1.0
 _LOOKS = 3
@@ -148,8 +149,8 @@ class WorkerProcess:
                 raise EOFError
             if time.monotonic() > until:
                 raise self._died(f"not done after {min(limit_s, left_s):g} s", Status.TIMEOUT)
-            pids = (self._process.pid, *_descendants(self._process.pid))
-            if limit_mb is not None and (used := _memory_kb(pids) * 1024 / 1e6) > limit_mb:
+            pids = (self._process.pid, *descendants(self._process.pid))
+            if limit_mb is not None and (used := memory_kb(pids) * 1024 / 1e6) > limit_mb:
                 text = f"{used:.0f} MB in use, the limit is {limit_mb:.0f} MB"
                 raise self._died(text, Status.OUT_OF_MEMORY)
             self._trimmed_log()
@@ -176,10 +177,10 @@ class WorkerProcess:
         end = self._heard.find(b"\n")
         while end < 0:
             begin = len(self._heard)
-            if begin > _LONGEST_MESSAGE:
+            if begin > _LONGEST_MESSAGE_BYTES:
                 raise ValueError("it is too long")
             try:
-                chunk = self._line.recv(_CHUNK)
+                chunk = self._line.recv(_CHUNK_BYTES)
             except TimeoutError:
                 waiting()
                 continue
@@ -227,8 +228,8 @@ class WorkerProcess:
                 os.kill(self._process.pid, signal.SIGSTOP)
         empty = 0  # looks in a row that found none: one may miss what is just being started
         for _ in range(_ROUNDS):
-            found = {*_descendants(self._process.pid), *_marked(self._mark)}
-            groups = {group for pid in found if (group := _group(pid)) is not None}
+            found = {*descendants(self._process.pid), *marked(self._mark)}
+            groups = {group for pid in found if (group := process_group(pid)) is not None}
             others = groups - {self._process.pid, os.getpgrp()}  # its own group ends with it
             empty = 0 if others else empty + 1
             if empty == _LOOKS:
@@ -257,7 +258,7 @@ class WorkerProcess:
         if self._log is None or not self._log.exists():
             return 0
         size = self._log.stat().st_size
-        if size > _LOG_MOST:
+        if size > _LONGEST_LOG_BYTES:
             tail = self._tail()
             os.truncate(self._log, 0)
             with self._log.open("ab") as file:
@@ -271,53 +272,8 @@ class WorkerProcess:
             return ""
         with self._log.open("rb") as file:
             size = file.seek(0, os.SEEK_END)
-            file.seek(max(self._log_start, size - _LOG_TAIL))
-            return file.read(_LOG_TAIL).decode(errors="replace")
-
-
-def _descendants(pid: int) -> Iterator[int]:
-    """Processes that a process started, and those that they started (Linux)."""
-    for file in Path(f"/proc/{pid}/task").glob("*/children"):
-        with contextlib.suppress(OSError):
-            for child in map(int, file.read_text().split()):
-                yield child
-                yield from _descendants(child)
-
-
-def _marked(mark: str) -> Iterator[int]:
-    """Processes in whose environment a worker has begun (Linux)."""
-    entry = f"{WORKER_VARIABLE}={mark}".encode()
-    for file in Path("/proc").glob("[0-9]*/environ"):
-        with contextlib.suppress(OSError):
-            if entry in file.read_bytes():
-                yield int(file.parent.name)
-
-
-def _group(pid: int) -> int | None:
-    """The process group of a process that runs; None if it has ended."""
-    with contextlib.suppress(OSError):
-        state, _, group = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[:3]
-        return None if state in "ZX" else int(group)
-    return None
-
-
-def _memory_kb(pids: Iterable[int]) -> float:
-    """Memory of processes that is no file on a disk, shared or not [KiB].
-
-    Files in memory that they hold open count where they are more than what is mapped of such.
-    """
-    private = shared = 0
-    files: dict[tuple[int, int], float] = {}
-    for pid in pids:
-        with contextlib.suppress(OSError):
-            for line in Path(f"/proc/{pid}/status").read_text().splitlines():
-                private += int(line.split()[1]) if line.startswith("RssAnon") else 0
-                shared += int(line.split()[1]) if line.startswith("RssShmem") else 0
-            for handle in Path(f"/proc/{pid}/fd").iterdir():
-                if os.readlink(handle).startswith(("/memfd:", "/dev/shm/")):
-                    found = handle.stat()
-                    files[found.st_dev, found.st_ino] = found.st_blocks / 2
-    return private + max(shared, sum(files.values()))
+            file.seek(max(self._log_start, size - _LOG_TAIL_BYTES))
+            return file.read(_LOG_TAIL_BYTES).decode(errors="replace")
 
 
 def _describe_exit(code: int) -> str:

@@ -88,11 +88,11 @@ class Episode(ArrayRecord, CheckedFields):
         super().__post_init__()
         length = len(self.times)
         count = len(self.world.movables)
-        put = object.__setattr__
+        put = object.__setattr__  # the class is frozen
         if length == 0 or (np.diff(self.times) <= 0.0).any():
             raise InvalidInputError("episode.times must hold at least one instant and increase")
         poses = np.asarray(self.object_poses)
-        if count == 0 and poses.size == 0:
+        if count == 0 and poses.size == 0:  # an empty list has the wrong shape
             poses = np.zeros((length, 0, 3))
         put(self, "object_poses", array("episode.object_poses", poses, (length, count, 3)))
         done = self.completed
@@ -131,9 +131,9 @@ class Episode(ArrayRecord, CheckedFields):
         arrays: dict[str, Any] = {key: getattr(self, key) for key in _ARRAYS}
         if self.plans is not None:
             arrays |= {key: getattr(self.plans, name) for key, name in _PLANS.items()}
-        arrays["header"] = np.array(json.dumps(header))
+        arrays["header"] = np.array(json.dumps(header))  # as a text: objects would be pickled
         size = sum(one.nbytes for one in arrays.values())
-        if size > MAX_BYTES:
+        if size > MAX_BYTES:  # else an episode is lost that `load` refuses later
             raise InvalidInputError(
                 f"an episode of {len(self.times)} instants and {len(self.world.movables)} objects "
                 f"has {size:,} bytes, {MAX_BYTES:,} are the greatest size of a file"

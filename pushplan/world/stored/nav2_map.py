@@ -28,6 +28,10 @@ _DEPTH = re.compile(rb"P[25](?:\s+(?:#.*\s+)*\d+){2}\s+(?:#.*\s+)*(\d+)")
 _MODES = ("trinary", "scale", "raw")
 _FORMATS = ("PPM", "PNG", "BMP")
 _MAX_PIXELS = 4096**2
+_TO_16_BITS = 257
+"""What a value of 8 bits is multiplied by: 65535 / 255."""
+_LUMA = np.array([299, 587, 114])
+"""Weights of red, green and blue in a grey value [1/1000], ITU-R BT.601."""
 _REQUIRED = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
 
 
@@ -80,12 +84,13 @@ def read_nav2_grid(path: str | Path) -> tuple[IntArray, float, FloatArray]:
         grey, opaque = _picture(path.parent / word("image", data["image"]))
     except InvalidInputError as error:
         raise type(error)(f"{path}: {error}") from error
-    if mode == "raw":
+    if mode == "raw":  # the grid itself, in percent; all else is unknown
         cells = np.where(grey <= 100, grey, -1)
     else:
         cells = _compared(grey, bool(negate), low, high, mode == "scale")
         cells[~opaque] = -1
-    return np.ascontiguousarray(cells[::-1].astype(np.int64)), side, origin
+    upwards = cells[::-1]  # a picture begins with its top row, a grid with the lowest
+    return np.ascontiguousarray(upwards.astype(np.int64)), side, origin
 
 
 def _compared(grey: IntArray, negate: bool, low: float, high: float, scale: bool) -> IntArray:
@@ -120,7 +125,7 @@ def _picture(path: Path) -> tuple[IntArray, BoolArray]:
     depth = _DEPTH.match(data)
     if depth is not None and 0 < int(depth[1]) < 255:  # Pillow rounds to the nearest
         most = int(depth[1])
-        grey = np.rint(grey * (most / 255.0)).astype(np.int64) * (65535 // most) // 257
+        grey = np.rint(grey * (most / 255.0)).astype(np.int64) * (65535 // most) // _TO_16_BITS
     return grey, opaque
 
 
@@ -132,10 +137,10 @@ def _pixels(image: Any) -> tuple[IntArray, BoolArray]:
         shown = np.full(deep.shape, True)
         if hidden is not None:
             shown = deep != hidden
-        return deep // 257, shown
+        return deep // _TO_16_BITS, shown
     wanted = "RGB"
     if hidden is not None or image.mode in ("LA", "RGBA", "PA"):
         wanted = "RGBA"
     pixels = np.asarray(image.convert(wanted), dtype=np.int64)
-    grey = (257 * pixels[..., :3] @ np.array([299, 587, 114]) + 500) // 1000 // 257
+    grey = (_TO_16_BITS * pixels[..., :3] @ _LUMA + 500) // 1000 // _TO_16_BITS
     return grey, pixels[..., 3:].min(axis=2, initial=255) == 255
