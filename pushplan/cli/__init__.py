@@ -38,11 +38,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.environ[TRUST_VARIABLE] = "1"  # where worker processes see it too
     try:
         code: int = named(options.run)(options)
-        sys.stdout.flush()
+        sys.stdout.flush()  # a full disk or a closed pipe is reported here, or nowhere
         return code
     except KeyboardInterrupt:
         return fail("interrupted", 130)
     except BrokenPipeError:  # the reader of our output has gone
+        # Python flushes once more when it ends, which would fail again
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except Exception as error:
@@ -56,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         error = missing(error) or error
         if not isinstance(error, PushplanError | OSError):
-            raise
+            raise  # a fault of ours: its traceback is wanted
         users = (InvalidInputError, UnknownNameError, MissingDependencyError, *_USER_OS_ERRORS)
         text = str(error)
         if isinstance(error, OSError) and error.strerror and error.filename is not None:

@@ -109,7 +109,7 @@ class Cockpit:
         # a simulator records no more poses than the metrics need, so they are interpolated
         recorded = np.concatenate([trace.robot_poses[:, None], trace.object_poses], axis=1)
         poses = np.concatenate([self._last[None], recorded])
-        poses[..., 2] = np.unwrap(poses[..., 2], axis=0)
+        poses[..., 2] = np.unwrap(poses[..., 2], axis=0)  # else a body spins where its angle wraps
         motion = make_interp_spline([self._time, *trace.times], poses, k=1)
         count = max(1, int(seconds / FRAME_TIME))
         for fraction in (np.arange(count) + 1.0) / count:
@@ -122,6 +122,7 @@ class Cockpit:
         self._trail.append(trace.robot_poses[:, :2])
         self._last = recorded[-1]
         self._time = world.time
+        # frames are due by the plan, not by when the last one was shown, so delays do not add up
         self._due = max(begin + seconds, self._clock.perf_counter() - LATE)
 
     def farewell(self, episode: Episode) -> bool:

@@ -75,7 +75,7 @@ def _finite(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_finite(item) for item in value]
     if isinstance(value, float) and not math.isfinite(value):
-        return None  # JSON has neither NaN nor infinity
+        return None  # JSON has no word for NaN and infinity
     return value
 
 

@@ -88,6 +88,7 @@ def check_directory(
     from pushplan.files.output_files import check_folder
 
     folder = Path(path).absolute()
+    # the folders that are missing will be made in the last one that is there
     there = next(one for one in (folder, *folder.parents) if one.exists())
     if not there.is_dir():
         raise InvalidInputError(f"cannot use {path!r} as a folder: {there} is a file")

@@ -46,6 +46,7 @@ class CommandParser(argparse.ArgumentParser):
         """Refuse what is not known here, where it is known which options are."""
         found, unknown = super().parse_known_args(args, namespace)
         if unknown and unknown[0].startswith("-"):
+            # here as elsewhere: what most command lines need none of is imported late
             from pushplan.errors import unknown_name_message
 
             options = [name for name in self._option_string_actions if name.startswith("--")]

@@ -20,6 +20,7 @@ _STILL = 0.005
 _STILL_TURN = 0.02
 """Motion below which nothing has really moved [sides of a map of pixels or heading steps, rad]."""
 _REMEMBERED = 1000
+"""Latest decisions that are not repeated from the same place."""
 
 Function = Callable[[NDArray[Any]], NDArray[Any]]
 """From one observation, without batch axis, to the output for it."""

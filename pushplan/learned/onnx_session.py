@@ -16,6 +16,11 @@ GREATEST_MEMORY = 256 * 2**20
 """Bytes that all networks of a process may use for weights and values together."""
 LONGEST_DECISION_S = 10.0
 """After that much time of one decision the network is told to stop [s]."""
+FATAL = 4
+"""Severity from which on ONNX Runtime writes to standard error: what it raises is not written."""
+BY_WHAT_IS_ASKED = 1
+"""Growth of memory by what is asked for; its default, to the next power of two, meets the bound
+with half of it unused."""
 
 
 NOISE = "noise"
@@ -42,9 +47,10 @@ class Network:
     def __init__(self, data: bytes) -> None:
         self._runtime = _runtime()
         options = self._runtime.SessionOptions()
+        # sums depend on the number of threads, and worker processes have a core each
         options.intra_op_num_threads = 1
         options.inter_op_num_threads = 1
-        options.log_severity_level = 4
+        options.log_severity_level = FATAL
         options.add_session_config_entry("session.use_env_allocators", "1")
         try:
             self._session = self._runtime.InferenceSession(
@@ -89,7 +95,7 @@ class Network:
         if noise is not None:
             fed[NOISE] = noise[None]
         limits = self._runtime.RunOptions()
-        limits.log_severity_level = 4
+        limits.log_severity_level = FATAL
         timer = None
         if timed:  # a timer is a thread, which costs more than most decisions
             timer = threading.Timer(LONGEST_DECISION_S, setattr, (limits, "terminate", True))
@@ -121,7 +127,9 @@ def _runtime() -> Any:
     where = onnxruntime.OrtMemoryInfo(
         "Cpu", onnxruntime.OrtAllocatorType.ORT_ARENA_ALLOCATOR, 0, onnxruntime.OrtMemType.DEFAULT
     )
-    bound = onnxruntime.OrtArenaCfg({"max_mem": GREATEST_MEMORY, "arena_extend_strategy": 1})
+    bound = onnxruntime.OrtArenaCfg(
+        {"max_mem": GREATEST_MEMORY, "arena_extend_strategy": BY_WHAT_IS_ASKED}
+    )
     onnxruntime.create_and_register_allocator(where, bound)
     return onnxruntime
 

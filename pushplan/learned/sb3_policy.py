@@ -23,6 +23,7 @@ TRUST_VARIABLE = "PUSHPLAN_TRUST_PICKLES"
 """Set to 1 in the environment of the process, it says that pickles may be loaded."""
 MEMBER = f"{METADATA_KEY}.json"
 """Member of the zip, or ending of the file beside it, that holds the specification."""
+_LONGEST_MEMBER_BYTES = 2**20
 ALGORITHMS = ("PPO", "SAC", "A2C", "TD3", "DDPG")
 
 log = logging.getLogger(__name__)
@@ -89,7 +90,8 @@ def _look(path: Path) -> tuple[Specification, str]:
             if "data" not in names:
                 raise InvalidInputError(f"{path} is no Stable-Baselines3 file: it has no 'data'")
             text = None
-            if MEMBER in names and archive.getinfo(MEMBER).file_size < 2**20:
+            # a member of a few bytes may unpack to gigabytes
+            if MEMBER in names and archive.getinfo(MEMBER).file_size < _LONGEST_MEMBER_BYTES:
                 text = archive.read(MEMBER).decode()
     except InvalidInputError:
         raise

@@ -149,7 +149,7 @@ def compute(episode: Episode, names: Iterable[str] | None = None) -> Mapping[str
             raise InvalidInputError(
                 f"metric {name!r} must return a number or None, got {short(value)}"
             ) from error
-        if math.isnan(values[name]):
+        if math.isnan(values[name]):  # as None: the metric has no value here
             del values[name]
     return values
 
