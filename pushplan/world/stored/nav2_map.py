@@ -29,7 +29,7 @@ _MODES = ("trinary", "scale", "raw")
 _FORMATS = ("PPM", "PNG", "BMP")
 _MAX_PIXELS = 4096**2
 _TO_16_BITS = 257
-"""What a value of 8 bits is multiplied by: 65535 / 255."""
+"""Factor from a value of 8 bits to one of 16: 65535 / 255."""
 _LUMA = np.array([299, 587, 114])
 """Weights of red, green and blue in a grey value [1/1000], ITU-R BT.601."""
 _REQUIRED = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
