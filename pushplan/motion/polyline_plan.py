@@ -9,8 +9,9 @@ import numpy as np
 
 from pushplan.geometry.angles import wrap_angle
 from pushplan.motion.collision import first_blocked, footprint, obstacles
-from pushplan.world import Plan, PlanStatus, World
+from pushplan.world import Plan, PlanResult, PlanStatus, World
 from pushplan.world.checks import FloatArray
+from pushplan.world.planning_call import PlanningCall
 
 _FINE = 0.02  # distance of poses that are checked [circumscribed radii]
 
@@ -81,3 +82,15 @@ def polyline_status(world: World, plan: Plan) -> PlanStatus:
     if free < len(dense):
         return PlanStatus.PATH_ONLY
     return PlanStatus.SOLVED
+
+
+def polyline_result(
+    call: PlanningCall,
+    points: FloatArray,  # (N, 2) corners of the path that was found [m]
+    spacing: float,  # distance between the poses of its plan [R]
+    iterations: int,
+) -> PlanResult:
+    """The result of a planner whose paths are polylines."""
+    world = call.world
+    plan = polyline_plan(world, points, spacing * world.robot.circumscribed_radius)
+    return call.result(polyline_status(world, plan), plan, call.elapsed, iterations)

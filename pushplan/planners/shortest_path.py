@@ -10,7 +10,7 @@ import numpy as np
 from pushplan.control import PurePursuit
 from pushplan.geometry import VisibilityGraph
 from pushplan.motion.keep_out import keep_out
-from pushplan.motion.polyline_plan import polyline_plan, polyline_status
+from pushplan.motion.polyline_plan import polyline_result
 from pushplan.motion.speed_profile import start_margin
 from pushplan.planners.following.plan_follower import PlanFollower
 from pushplan.world import Planner, PlanResult, PlanStatus, Stop, World
@@ -62,10 +62,7 @@ class ShortestPath:
             if late:
                 return call.result(call.stopped_status, iterations=looks)
             if np.isfinite(path.length):
-                spacing = self.spacing * robot.circumscribed_radius
-                plan = polyline_plan(world, path.points, spacing)
-                status = polyline_status(world, plan)
-                return call.result(status, plan, call.elapsed, looks)
+                return polyline_result(call, path.points, self.spacing, looks)
         if start_margin(world, 0.0) is None:
             return call.result(PlanStatus.START_BLOCKED)
         return call.result(PlanStatus.GOAL_UNREACHABLE)

@@ -14,7 +14,7 @@ from scipy.spatial import QhullError, Voronoi, cKDTree
 from pushplan.control import PurePursuit
 from pushplan.geometry import VisibilityGraph
 from pushplan.motion.keep_out import keep_out
-from pushplan.motion.polyline_plan import polyline_plan, polyline_status
+from pushplan.motion.polyline_plan import polyline_result
 from pushplan.motion.speed_profile import start_margin
 from pushplan.motion.time_slicing import Stopped, go_on
 from pushplan.planners.following.plan_follower import PlanFollower
@@ -83,8 +83,7 @@ class Skeleton:
             points = None
         if points is None:
             return call.result(status, iterations=1)
-        plan = polyline_plan(world, points, self.spacing * world.robot.circumscribed_radius)
-        return call.result(polyline_status(world, plan), plan, call.elapsed, 1)
+        return polyline_result(call, points, self.spacing, 1)
 
     def _path(self, world: World, call: PlanningCall) -> tuple[PlanStatus, FloatArray | None]:
         """Corners of the path (N, 2) [m] from the robot to the goal.

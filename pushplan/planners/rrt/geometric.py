@@ -11,7 +11,7 @@ from pushplan.compiled import kernel, owned
 from pushplan.geometry import core_distance
 from pushplan.motion.collision import ConvexObstacles, obstacles
 from pushplan.motion.keep_out import keep_out
-from pushplan.motion.polyline_plan import polyline_plan, polyline_status
+from pushplan.motion.polyline_plan import polyline_result
 from pushplan.motion.random_tree.ompl_calls import (
     GoalRegion,
     grow_to,
@@ -92,9 +92,7 @@ class GeometricRRT:
             points, used = self._grow(call, among, radius, iterations)
             iterations += used
             if points is not None:
-                plan = polyline_plan(world, points, _SPACING * size)
-                status = polyline_status(world, plan)
-                return call.result(status, plan, call.elapsed, iterations)
+                return polyline_result(call, points, _SPACING, iterations)
             if call.check(iterations, np.inf):
                 break
         return call.result(call.stopped_status, iterations=iterations)
