@@ -17,8 +17,8 @@ from benchmarks.reporting import command_line
 
 KEY = ("policy", "scenario", "seed")
 STORED = Path(__file__).parents[1] / "reference" / "every_policy.csv"
-OF_THE_RUN = {"began", "host", "job"}
-"""Columns that say where and when a job ran, and by which code."""
+OF_THE_RUN = {"began", "host", "job", "trace"}
+"""Columns that say where and when a job ran, by which code, and how long its steps took."""
 
 
 def rows_of(run: Path) -> dict[tuple[str, ...], dict[str, str]]:
