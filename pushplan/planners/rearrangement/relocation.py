@@ -46,7 +46,7 @@ def relocating_pushes(
             return []
     if found is None:
         found = RelocationSearch(scene, k, approach, thorough).run()
-        if cache is not None and not scene.budget.interrupted:
+        if cache is not None and not scene.budget.is_over:
             cache.keep_relocations(int(movables.ids[k]), asked, found)
     pushes = []
     for path, extra, moved in found:

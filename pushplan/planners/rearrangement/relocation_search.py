@@ -136,6 +136,7 @@ class RelocationSearch:
         """Drives, each with the cost of what it leaves to be done [m]."""
         scene = self._scene
         k = self._k
+        scene.budget.start_part()
         if can_be_pushed(scene, k, self._horizon):  # but not as far as home
             self._horizon = scene.longest
         now = float(self._rest(scene.poses[[k]])[0])
@@ -150,7 +151,7 @@ class RelocationSearch:
         sides = Counter[_Cell]()
         alike = Counter[_Cell]()
         while self._open and expansions < _EXPANSIONS and sides.total() < _ENOUGH_MARGINS:
-            if scene.budget.is_over:
+            if scene.budget.part_is_over:
                 break
             state = heapq.heappop(self._open)[2]
             if state.cost > best + self._slack:

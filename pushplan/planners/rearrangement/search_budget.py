@@ -9,6 +9,9 @@ from pushplan.world import Stop
 
 _HARDEST = 10
 """Budgets after which the search is over, which only searches for relocations come to."""
+_PART = 5
+"""Budgets for one of them: less than are left when the first begins, so that each decision gets
+to the end of one at least and the next decision need not begin with it again."""
 
 
 class SearchBudget:
@@ -29,6 +32,7 @@ class SearchBudget:
         self.used = 0
         self.cost = math.inf
         self.interrupted = False
+        self._part_began = 0
 
     def start(self, stop: Stop | None, most: float) -> None:
         """Begin the search.
@@ -48,6 +52,15 @@ class SearchBudget:
         if stopped or self.used >= _HARDEST * self._most:
             self._over = self.interrupted = True
         return self._over
+
+    def start_part(self) -> None:
+        """Begin a part of the search that has a limit of its own."""
+        self._part_began = self.used
+
+    @property
+    def part_is_over(self) -> bool:
+        """True if the part of the search in hand has to end."""
+        return self.is_over or self.used - self._part_began >= _PART * self._most
 
     @property
     def is_used_up(self) -> bool:

@@ -13,6 +13,7 @@ from conftest import make_boxes, make_robot, make_u_maze
 from pushplan.envs import PushEnv
 from pushplan.planners import make_policy, policy_names
 from pushplan.planners.rearrangement import GtspMpc, RearrangementConfig
+from pushplan.planners.rearrangement.push_choice import choose_push
 from pushplan.world import (
     Deadline,
     InvalidInputError,
@@ -150,6 +151,22 @@ def test_the_rollouts_of_a_choice_are_bounded():
     commands = [policy.act(room(boxes)) for policy in (few, many, ruled)]
     assert 0 < len(few.graph.pushes) < len(many.graph.pushes)
     assert commands[0] == commands[2] != Twist(0.0, 0.0)  # an own budget is the same one
+
+
+def test_a_choice_that_ran_out_of_budget_leaves_less_to_the_next(monkeypatch):
+    """Searches that it came to the end of are kept, so that the robot does not search for ever."""
+    budgets = []
+
+    def noted(scene, *args, **options):
+        budgets.append(scene.budget)
+        return choose_push(scene, *args, **options)
+
+    monkeypatch.setattr("pushplan.planners.rearrangement.gtsp_mpc.choose_push", noted)
+    policy = GtspMpc(max_rollouts=6)
+    corners = room([(-4.49, -4.49, 0.0), (4.49, 4.49, 0.0), (-4.49, 4.49, 0.0)])
+    for step in range(20):
+        policy.act(corners.moved(time=400.0 * step))
+    assert budgets[0].interrupted and budgets[-1].used == 0
 
 
 def test_a_box_delivered_by_accident_is_dropped():
