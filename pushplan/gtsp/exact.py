@@ -6,67 +6,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pushplan.compiled import copy_into, kernel
+from pushplan.core import gtsp as core
 from pushplan.gtsp.problem import Padded, Problem
 from pushplan.world.checks import FloatArray, IntArray
 
 
-@kernel
-def fill_subsets(
-    low: int,  # at least 1
-    high: int,
-    table: FloatArray,  # (2^m, m, K), filled up to ``low``
-    blocks: FloatArray,  # (m, K, m, K) cost from node i of c to node j of d, infinite padding
-    sizes: IntArray,  # (m,) nodes of each cluster
-    first: FloatArray,  # (m, K) cost from the root to each node
-) -> None:
-    """Fill the subsets ``low`` to ``high - 1`` (Held and Karp 1962, over clusters)."""
-    # table[S, c, j]: cost of the cheapest path from the root through one node of every cluster in S
-    # (a bit mask) that ends in node j of cluster c; subsets come before what holds them
-    count, width = first.shape
-    for subset in range(low, high):
-        for d in range(count):
-            if not (subset >> d) & 1:
-                continue
-            out = table[subset, d]
-            rest = subset ^ (1 << d)
-            if rest == 0:
-                copy_into(out, first[d])
-                continue
-            out[:] = np.inf
-            for c in range(count):
-                if (rest >> c) & 1:
-                    _relax(table[rest, c], blocks[c, :, d], sizes[c], out, width)
-
-
-@kernel
-def _relax(values: FloatArray, block: FloatArray, size: int, out: FloatArray, width: int) -> None:
-    """``out = min(out, values + block)`` over the rows of a block, four at a time."""
-    i = 0
-    while i + 3 < size:
-        a = values[i]
-        b = values[i + 1]
-        c = values[i + 2]
-        d = values[i + 3]
-        row_a = block[i]
-        row_b = block[i + 1]
-        row_c = block[i + 2]
-        row_d = block[i + 3]
-        for j in range(width):
-            x = min(a + row_a[j], b + row_b[j])
-            y = min(c + row_c[j], d + row_d[j])
-            out[j] = min(out[j], min(x, y))
-        i += 4
-    while i < size:
-        a = values[i]
-        row_a = block[i]
-        for j in range(width):
-            out[j] = min(out[j], a + row_a[j])
-        i += 1
-
-
 ARCS_PER_SECOND = 1.5e9
-"""Number of arcs that the kernel looks at in a second, on a slow machine."""
+"""Number of arcs that the core looks at in a second, on a slow machine."""
 
 
 def table_mb(problem: Problem) -> float:
@@ -108,7 +54,7 @@ def solve_exactly(
             if stopped():
                 return False, None
             high = min(low + step, subsets)
-            fill_subsets(low, high, table, padded.costs, padded.sizes, first)
+            core.fill_subsets(low, high, table, padded.costs, padded.sizes, first)
         ends = table[-1] + padded.pick(problem.costs[:, root])
         if ends.min() < best:
             best = ends.min()

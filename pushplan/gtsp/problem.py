@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pushplan.compiled import owned
-from pushplan.gtsp.dominance_kernels import needed_nodes
-from pushplan.gtsp.node_choice_kernels import SPARE
+from pushplan.core import gtsp as core
 from pushplan.world.checks import FloatArray, IntArray
 
 
@@ -39,10 +38,11 @@ class Problem:
 
     def reduced(self) -> Problem:
         """The same without nodes that another one of their cluster can always stand for."""
-        needed = needed_nodes(self.costs, self.offsets)
-        if len(needed) == len(self.costs):
+        needed = np.ones(len(self.costs), np.int64)
+        core.mark_needed(self.costs, np.ascontiguousarray(self.costs.T), self.offsets, needed)
+        if needed.all():
             return self
-        return self.only(needed)
+        return self.only(np.flatnonzero(needed))
 
     def only(self, kept: IntArray) -> Problem:
         """The same with some nodes, (k,) ascending, at least one of each cluster."""
@@ -94,8 +94,8 @@ class Problem:
     @cached_property
     def finite(self) -> FloatArray:
         """(N, N + SPARE) costs; a forbidden arc costs `penalty`."""
-        wide = np.full((len(self.costs), len(self.costs) + SPARE), self.penalty)
-        wide[:, :-SPARE] = np.where(np.isfinite(self.costs), self.costs, self.penalty)
+        wide = np.full((len(self.costs), len(self.costs) + core.SPARE), self.penalty)
+        wide[:, : -core.SPARE] = np.where(np.isfinite(self.costs), self.costs, self.penalty)
         return wide
 
     @cached_property
@@ -104,7 +104,7 @@ class Problem:
         if self.symmetric:
             return self.finite
         wide = np.full_like(self.finite, self.finite[0, -1])
-        wide[:, :-SPARE] = self.finite[:, :-SPARE].T
+        wide[:, : -core.SPARE] = self.finite[:, :-core.SPARE].T
         return wide
 
     @cached_property
@@ -161,7 +161,7 @@ def tour_cost(costs: NDArray[np.number], nodes: IntArray) -> float:
 
 
 def _cheapest(wide: FloatArray, offsets: IntArray) -> FloatArray:
-    least: FloatArray = np.minimum.reduceat(wide[:, :-SPARE], offsets[:-1], axis=0)
+    least: FloatArray = np.minimum.reduceat(wide[:, : -core.SPARE], offsets[:-1], axis=0)
     return np.ascontiguousarray(least)
 
 

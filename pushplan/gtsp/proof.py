@@ -11,11 +11,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
+from pushplan.core import gtsp as core
 from pushplan.gtsp.problem import Problem, tour_cost
-from pushplan.gtsp.walk_kernels import Paths, WalkProblem, extend_paths
 from pushplan.gtsp.walks import CHUNK_ARCS, StopFired, Walks
 from pushplan.world.checks import FloatArray, IntArray
 
@@ -28,6 +29,16 @@ STAGES = ((0, 30), (3, 20), (4, 20), (6, 15), (8, 12), (9, 12))
 """Clusters that walks remember, and steps of the prices with it."""
 FEW_PATHS = 4_000
 """Paths that are worth a try before walks remember more; doubles with each cluster remembered."""
+
+
+class Paths(NamedTuple):
+    """Partial tours of one length."""
+
+    sets: IntArray  # (P,) clusters of each path as a bit mask
+    ends: IntArray  # (P,) its last node, ``d * K + i``
+    values: FloatArray  # (P,) its cost
+    rests: FloatArray  # (P,) sum of the prices of the clusters that it lacks
+    parents: IntArray  # (P,) the path that it comes from
 
 
 @dataclass
@@ -135,13 +146,13 @@ def cheaper_tour(
     slots = np.empty(1 << int(np.ceil(np.log2(2 * most))), dtype=np.int64)
     step = max(1, CHUNK_ARCS // (4 * walks.count * walks.width))
     for within in walks.walks[-2::-1]:
-        problem = WalkProblem(within, costs, walks.known, walks.prices, sizes, walks.limit)
+        bounds = (within, costs, walks.known, walks.prices, sizes, walks.limit)
         longer = Paths._make(np.empty(most, dtype=part.dtype) for part in paths)
         found = 0
         slots[:] = -1
         for low in range(0, len(paths.ends), step):
             high = min(low + step, len(paths.ends))
-            found = extend_paths(problem, paths, low, high, slots, longer, found)
+            found = core.extend_paths(*bounds, paths, low, high, slots, longer, found)
             walks.look()
             if found < 0:
                 return False, None

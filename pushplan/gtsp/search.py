@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pushplan.core import gtsp as core
 from pushplan.gtsp.gtsp_config import GtspConfig
-from pushplan.gtsp.node_choice_kernels import SPARE, best_nodes
 from pushplan.gtsp.problem import Problem, tour_cost
-from pushplan.gtsp.ruin_recreate_kernels import TourProblem, TourState, search_tours
-from pushplan.world.checks import FloatArray, IntArray
+from pushplan.world.checks import IntArray
 from pushplan.world.stop import MaxIterations, Stop, StopCheck, rules_of
 
 MOST_ROUNDS = 2000
@@ -81,7 +80,7 @@ class AnytimeSearch:
         self,
         problem: Problem,  # with at least 3 clusters
         config: GtspConfig,
-        seed: IntArray,  # (1,) uint64 of the random numbers; changed
+        seed: int,  # of the random numbers, not 0
         budget: Budget,  # of the call
     ) -> None:
         self.config = config
@@ -93,20 +92,21 @@ class AnytimeSearch:
         self.pace = 3e-5 + 3e-7 * problem.width**2
         self.narrowed = False
         rest = np.delete(np.arange(problem.count), problem.root)
-        order = np.concatenate(([problem.root], rest))
-        nodes = problem.offsets[order]
-        values = np.full(2, np.inf)
-        self._use(problem)
-        self.tour = TourState(
-            order.copy(), nodes.copy(), order, nodes, values, self._no_slack(), seed
+        self.problem = problem
+        self.tour = core.RuinRecreate(
+            self._arrays(),
+            np.concatenate(([problem.root], rest)),
+            seed,
+            self.max_removed,
+            config.blink,
+            _SWAP_NEIGHBOURS,
         )
 
-    def _use(self, problem: Problem) -> None:
-        """Go on with this problem."""
-        config = self.config
+    def _arrays(self) -> core.Problem:
+        """The problem as the core takes it."""
+        problem = self.problem
         near, between = problem.nearest(_NEIGHBOURS if problem.symmetric else _NEIGHBOURS * 4 // 3)
-        self.problem = problem
-        self.arrays = TourProblem(
+        return core.Problem(
             problem.finite,
             problem.reverse,
             problem.into,
@@ -114,14 +114,8 @@ class AnytimeSearch:
             problem.offsets,
             near,
             between,
-            self.max_removed,
-            config.blink,
-            min(_SWAP_NEIGHBOURS, near.shape[1]),
             problem.symmetric,
         )
-
-    def _no_slack(self) -> FloatArray:
-        return np.repeat([[np.inf], [0.0]], len(self.problem.names), axis=1)
 
     def run(
         self,
@@ -132,34 +126,33 @@ class AnytimeSearch:
         """One annealing until it is frozen, from a random order or again from the best one."""
         config = self.config
         budget = self.budget
-        values = self.tour.values
+        tour = self.tour
         lowest = np.inf
         frozen = 0.0
         first = not again
         hot = config.hot
         cold = _COLD
         if again:
-            self.tour.current[:] = self.tour.best
-            self.tour.current_nodes[:] = self.tour.best_nodes
+            tour.start_from_best()
             hot = _REHEAT * self.best_heat
             cold = 0.5 * config.frozen * self.best_heat
         else:
             self._random_start()
         while not budget.stopped():
             gone = budget.gone()
-            if gone >= end and np.isfinite(values[1]):
+            if gone >= end and np.isfinite(tour.best_cost):
                 break
             progress = min(max((gone - begin) / (end - begin), 0.0), 1.0)
             heat = hot * (cold / hot) ** progress
-            before = values[1]
+            before = tour.best_cost
             if progress > _NARROW_AFTER and not self.narrowed:
                 self._narrow(heat * self.scale)
             self._rounds(0.0 if first else heat * self.scale)
-            if values[1] < before and not first:
+            if tour.best_cost < before and not first:
                 self.best_heat = heat
             first = False
-            if values[0] < lowest - 1e-9 * abs(values[0]):  # not by rounding alone
-                lowest = values[0]
+            if tour.cost < lowest - 1e-9 * abs(tour.cost):  # not by rounding alone
+                lowest = tour.cost
                 frozen = config.frozen * heat
             elif heat < frozen:
                 break
@@ -180,21 +173,18 @@ class AnytimeSearch:
             or NARROW_S * nodes**2 >= 0.5 * self.budget.seconds
         ):
             return
-        good = tour.slack[0] <= config.narrow_slack * temperature
+        good = tour.least_slack <= config.narrow_slack * temperature
+        total = tour.total_slack
         for members in problem.members:
             if good[members].sum() > config.narrow_width:
-                score = np.where(good[members], tour.slack[1, members], np.inf)
+                score = np.where(good[members], total[members], np.inf)
                 worst = np.argsort(score, kind="stable")[config.narrow_width :]
                 good[members[worst]] = False
-        good[tour.current_nodes] = good[tour.best_nodes] = True
+        good[tour.nodes] = good[tour.best_nodes] = True
         kept = np.flatnonzero(good)
-        self._use(problem.only(kept))
+        self.problem = problem.only(kept)
+        tour.narrow(self._arrays(), kept)
         self.narrowed = True
-        self.tour = tour._replace(
-            current_nodes=np.searchsorted(kept, tour.current_nodes),
-            best_nodes=np.searchsorted(kept, tour.best_nodes),
-            slack=self._no_slack(),
-        )
 
     def runs_in(self, fraction: float) -> int:
         """Return the number of runs for which a fraction of the budget suffices."""
@@ -208,50 +198,39 @@ class AnytimeSearch:
     @property
     def scale(self) -> float:
         """Mean reduced arc of the best tour."""
-        spread = (self.tour.values[1] - self.floor) / self.problem.count
+        spread = (self.tour.best_cost - self.floor) / self.problem.count
         return float(spread) if np.isfinite(spread) else 0.0
 
     def _rounds(self, temperature: float) -> None:
         config = self.config
         budget = self.budget
-        values = self.tour.values
+        tour = self.tour
         rounds = int(min(max(config.chunk_s / self.pace, 1.0), MOST_ROUNDS))
         if budget.rounds < np.inf:  # the same pieces on every machine
             rounds = max(1, int(min(100, budget.rounds // 200, budget.rounds - budget.used)))
         began = time.perf_counter()
-        tolerance = 1e-12 * max(abs(values[1]), abs(values[0]))
-        search_tours(self.arrays, self.tour, temperature, tolerance, rounds)
+        tolerance = 1e-12 * max(abs(tour.best_cost), abs(tour.cost))
+        tour.run(temperature, tolerance, rounds)
         self.pace = 0.5 * self.pace + 0.5 * (time.perf_counter() - began) / rounds
         budget.used += rounds
         self._note_best()
 
     def _note_best(self) -> None:
-        if self.tour.values[1] < self.budget.cost:
+        if self.tour.best_cost < self.budget.cost:
             self.budget.note(tour_cost(self.problem.costs, self.tour.best_nodes))
 
     def _random_start(self) -> None:
         problem = self.problem
         tour = self.tour
-        rng = np.random.default_rng(int(tour.random[0]) + self.budget.used)
-        tour.current[1:] = rng.permutation(np.delete(np.arange(problem.count), tour.current[0]))
-        layers = np.empty((problem.count, problem.width + SPARE))
-        tour.values[0] = best_nodes(
-            problem.finite,
-            problem.offsets,
-            tour.current,
-            problem.count,
-            tour.current_nodes,
-            layers,
+        rng = np.random.default_rng(tour.random_state + self.budget.used)
+        tour.start(
+            np.append(problem.root, rng.permutation(np.delete(np.arange(problem.count), problem.root)))
         )
-        if tour.values[0] < tour.values[1]:
-            tour.values[1] = tour.values[0]
-            tour.best[:] = tour.current
-            tour.best_nodes[:] = tour.current_nodes
-            self._note_best()
+        self._note_best()
 
 
 def search(
-    problem: Problem, config: GtspConfig, seed: IntArray, budget: Budget, fraction: float
+    problem: Problem, config: GtspConfig, seed: int, budget: Budget, fraction: float
 ) -> IntArray:
     """The best order of clusters that a fraction of the budget allows.
 
@@ -271,4 +250,4 @@ def search(
         if not again:  # it may have ended early
             whole = whole + budget.gone() - begin
             runs = runs + 1
-    return state.tour.best
+    return state.tour.best_order

@@ -76,8 +76,8 @@ def solve_gtsp(
         names, costs, clusters = graph_instance(costs)
     matrix = checked_costs(costs)
     members = checked_clusters(clusters, len(matrix))
-    seed = (np.random.default_rng(0) if rng is None else rng).integers(1, 2**63, 1)
-    call = _SolverCall(matrix, members, seed.astype(np.uint64), budget, stop, config)
+    seed = (np.random.default_rng(0) if rng is None else rng).integers(1, 2**63)
+    call = _SolverCall(matrix, members, int(seed), budget, stop, config)
     tour = call.solve()
     if names:
         tour = replace(tour, nodes=tuple(names[node] for node in tour.nodes))
@@ -90,7 +90,7 @@ class _SolverCall:
 
     costs: NDArray[np.number]
     members: tuple[IntArray, ...]
-    seed: IntArray
+    seed: int
     budget: Budget
     stop: Stop | None
     config: GtspConfig

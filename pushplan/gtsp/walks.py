@@ -12,8 +12,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from pushplan.core import gtsp as core
 from pushplan.gtsp.problem import Padded
-from pushplan.gtsp.walk_kernels import extend_walks, read_visits
 from pushplan.world.checks import FloatArray, IntArray
 
 MARGIN = 1e-10
@@ -94,7 +94,7 @@ class Walks:
         sizes = self.nodes.sizes
         for low in range(0, self.count, step):
             high = min(low + step, self.count)
-            extend_walks(walks, longer, blocks, self._moves, self.prices, sizes, low, high)
+            core.extend_walks(walks, longer, blocks, self._moves, self.prices, sizes, low, high)
             self.look()
 
     def fill(self) -> None:
@@ -113,7 +113,7 @@ class Walks:
         since = 0
         for _ in range(steps):
             self.fill()
-            cost = read_visits(
+            cost = core.read_visits(
                 self.walks,
                 self.first,
                 self.blocks,

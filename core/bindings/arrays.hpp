@@ -1,0 +1,56 @@
+// NumPy arrays seen as views. Arrays are never copied or converted: what has another type, another
+// number of dimensions or another layout is a TypeError.
+#pragma once
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+
+#include <span>
+#include <vector>
+
+#include "pushplan/array.hpp"
+
+namespace pushplan::bindings {
+
+namespace nb = nanobind;
+
+template <class T, std::size_t Rank>
+using Array = nb::ndarray<T, nb::ndim<Rank>, nb::c_contig, nb::device::cpu>;
+
+template <std::size_t Rank>
+using Floats = Array<const double, Rank>;
+template <std::size_t Rank>
+using Integers = Array<const Index, Rank>;
+template <std::size_t Rank>
+using FloatsOut = Array<double, Rank>;
+template <std::size_t Rank>
+using IntegersOut = Array<Index, Rank>;
+
+template <class T, nb::ssize_t... Extents>
+auto view(const nb::ndarray<T, nb::shape<Extents...>, nb::c_contig, nb::device::cpu>& array) {
+  constexpr std::size_t Rank = sizeof...(Extents);
+  if constexpr (Rank == 1) {
+    return std::span<T>(array.data(), array.shape(0));
+  } else {
+    typename ArrayView<T, Rank>::Shape shape;
+    for (std::size_t axis = 0; axis < Rank; ++axis) shape[axis] = static_cast<Index>(array.shape(axis));
+    return ArrayView<T, Rank>(array.data(), shape);
+  }
+}
+
+/// A NumPy array with a copy of these numbers.
+template <class T>
+auto copied(std::span<const T> values) {
+  auto* owned = new std::vector<T>(values.begin(), values.end());
+  nb::capsule owner(owned, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
+  return nb::ndarray<nb::numpy, T, nb::ndim<1>>(owned->data(), {owned->size()}, owner);
+}
+
+/// How a property returns an array that owns its numbers.
+inline constexpr auto kOwned = nb::rv_policy::move;
+
+using ReleaseGil = nb::call_guard<nb::gil_scoped_release>;
+
+void bind_gtsp(nb::module_& module);
+
+}  // namespace pushplan::bindings

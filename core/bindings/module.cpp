@@ -1,0 +1,7 @@
+#include "arrays.hpp"
+
+NB_MODULE(_core, module) {
+  module.doc() = "The compiled core of pushplan (C++, see core/). Arguments are not checked.";
+  auto gtsp = module.def_submodule("gtsp", "Parts of the GTSP solver.");
+  pushplan::bindings::bind_gtsp(gtsp);
+}
