@@ -1,0 +1,85 @@
+"""The build backend: scikit-build-core, with zig's compiler where the machine has none.
+
+Hooks of PEP 517 and PEP 660. Where no C++ compiler is found, the wheel ``ziglang`` becomes a build
+requirement, and scripts in the temporary folder call it by the names that CMake looks for.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import stat
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from scikit_build_core import build as _build
+
+_COMPILERS = ("c++", "g++", "clang++")
+_TARGET = "x86_64-linux-gnu.2.28"
+_TOOLS = {"CXX": "c++", "AR": "ar", "RANLIB": "ranlib"}
+
+
+def _needs_zig() -> bool:
+    named = os.environ.get("CXX")
+    return named is None and not any(shutil.which(name) for name in _COMPILERS)
+
+
+def _requirements(ask: Any, settings: dict[str, Any] | None) -> list[str]:
+    return [*ask(settings), *(["ziglang>=0.13"] if _needs_zig() else [])]
+
+
+def _with_compiler(build: Any, *arguments: Any) -> str:
+    if _needs_zig():
+        _use_zig()
+    return str(build(*arguments))
+
+
+def _use_zig() -> None:
+    """Write scripts that call zig as a compiler, and name them in the environment."""
+    folder = Path(tempfile.mkdtemp(prefix="pushplan-zig-"))
+    for variable, tool in _TOOLS.items():
+        script = folder / tool
+        options = f' -target {_TARGET.replace("x86_64", os.uname().machine)}' if tool == "c++" else ""
+        script.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m ziglang {tool}{options} "$@"\n')
+        script.chmod(script.stat().st_mode | stat.S_IXUSR)
+        os.environ[variable] = str(script)
+    os.environ["CMAKE_ARGS"] = " ".join(
+        [
+            os.environ.get("CMAKE_ARGS", ""),
+            f"-DCMAKE_AR={folder / 'ar'}",
+            f"-DCMAKE_RANLIB={folder / 'ranlib'}",
+            "-DCMAKE_CXX_SCAN_FOR_MODULES=OFF",
+        ]
+    ).strip()
+
+
+def get_requires_for_build_wheel(settings: dict[str, Any] | None = None) -> list[str]:
+    """Requirements of a wheel."""
+    return _requirements(_build.get_requires_for_build_wheel, settings)
+
+
+def get_requires_for_build_editable(settings: dict[str, Any] | None = None) -> list[str]:
+    """Requirements of an editable installation."""
+    return _requirements(_build.get_requires_for_build_editable, settings)
+
+
+def get_requires_for_build_sdist(settings: dict[str, Any] | None = None) -> list[str]:
+    """Requirements of a source distribution, which compiles nothing."""
+    return list(_build.get_requires_for_build_sdist(settings))
+
+
+def build_wheel(folder: str, settings: Any = None, metadata: str | None = None) -> str:
+    """Build a wheel."""
+    return _with_compiler(_build.build_wheel, folder, settings, metadata)
+
+
+def build_editable(folder: str, settings: Any = None, metadata: str | None = None) -> str:
+    """Build the module into the tree, and a wheel that leads to the tree."""
+    return _with_compiler(_build.build_editable, folder, settings, metadata)
+
+
+def build_sdist(folder: str, settings: Any = None) -> str:
+    """Build a source distribution."""
+    return str(_build.build_sdist(folder, settings))
