@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "pushplan/array.hpp"
+#include "pushplan/geometry/pose.hpp"
 
 namespace pushplan::bindings {
 
@@ -38,6 +39,25 @@ auto view(const nb::ndarray<T, nb::shape<Extents...>, nb::c_contig, nb::device::
   }
 }
 
+using Poses = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+using PosesOut = nb::ndarray<double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+using Points = nb::ndarray<const double, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>;
+using OnePose = nb::ndarray<const double, nb::shape<3>, nb::c_contig, nb::device::cpu>;
+
+/// Rows of x, y, theta as poses, and of x, y as points: the same numbers in memory.
+inline std::span<const Pose> poses(const Poses& array) {
+  return {reinterpret_cast<const Pose*>(array.data()), array.shape(0)};
+}
+inline std::span<Pose> poses(const PosesOut& array) {
+  return {reinterpret_cast<Pose*>(array.data()), array.shape(0)};
+}
+inline std::span<const Vec2> points(const Points& array) {
+  return {reinterpret_cast<const Vec2*>(array.data()), array.shape(0)};
+}
+inline Pose pose(const OnePose& array) {
+  return {array.data()[0], array.data()[1], array.data()[2]};
+}
+
 /// A NumPy array with a copy of these numbers.
 template <class T>
 auto copied(std::span<const T> values) {
@@ -52,5 +72,6 @@ inline constexpr auto kOwned = nb::rv_policy::move;
 using ReleaseGil = nb::call_guard<nb::gil_scoped_release>;
 
 void bind_gtsp(nb::module_& module);
+void bind_interaction(nb::module_& module);
 
 }  // namespace pushplan::bindings

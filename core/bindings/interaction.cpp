@@ -1,0 +1,71 @@
+#include "arrays.hpp"
+#include "pushplan/interaction/quasi_static.hpp"
+
+namespace pushplan::bindings {
+
+using namespace nb::literals;
+
+void bind_interaction(nb::module_& module) {
+  nb::class_<Bodies>(module, "Bodies", "A robot, objects and walls.")
+      .def(
+          "__init__",
+          [](Bodies* self, const Points& robot_vertices, const Integers<1>& robot_offsets,
+             Index wall_parts, double robot_radius, const Points& vertices,
+             const Integers<1>& offsets, const Floats<1>& radii, const Floats<1>& inverse_masses,
+             const Floats<1>& inverse_gyration, const Points& wall_vertices,
+             const Integers<1>& wall_offsets, const Floats<2>& wall_boxes) {
+            const auto* boxes = reinterpret_cast<const Box*>(wall_boxes.data());
+            new (self) Bodies{{points(robot_vertices), view(robot_offsets)},
+                              wall_parts,
+                              robot_radius,
+                              {points(vertices), view(offsets)},
+                              view(radii),
+                              view(inverse_masses),
+                              view(inverse_gyration),
+                              {points(wall_vertices), view(wall_offsets)},
+                              {boxes, wall_boxes.shape(0)}};
+          },
+          "robot_vertices"_a.noconvert(), "robot_offsets"_a.noconvert(), "wall_parts"_a,
+          "robot_radius"_a, "vertices"_a.noconvert(), "offsets"_a.noconvert(),
+          "radii"_a.noconvert(), "inverse_masses"_a.noconvert(), "inverse_gyration"_a.noconvert(),
+          "wall_vertices"_a.noconvert(), "wall_offsets"_a.noconvert(),
+          "wall_boxes"_a.noconvert(), nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(),
+          nb::keep_alive<1, 6>(), nb::keep_alive<1, 7>(), nb::keep_alive<1, 8>(),
+          nb::keep_alive<1, 9>(), nb::keep_alive<1, 10>(), nb::keep_alive<1, 11>(),
+          nb::keep_alive<1, 12>(), nb::keep_alive<1, 13>());
+
+  nb::class_<QuasiStatic>(module, "QuasiStatic",
+                          "Quasi-static pushing with memory for one thread.")
+      .def(
+          "__init__",
+          [](QuasiStatic* self, const Bodies& bodies, double max_step, double tolerance,
+             double jam_depth, Index iterations, double friction, double static_friction) {
+            new (self) QuasiStatic(bodies, {max_step, tolerance, jam_depth, iterations, friction,
+                                            static_friction});
+          },
+          "bodies"_a, "max_step"_a, "tolerance"_a, "jam_depth"_a, "iterations"_a, "friction"_a,
+          "static_friction"_a, nb::keep_alive<1, 2>())
+      .def(
+          "advance",
+          [](QuasiStatic& self, const OnePose& from, const OnePose& to, const PosesOut& objects,
+             const FloatsOut<1>& lengths) {
+            return self.advance(pose(from), pose(to), poses(objects), view(lengths));
+          },
+          "robot_from"_a.noconvert(), "robot_to"_a.noconvert(), "poses"_a.noconvert(),
+          "lengths"_a.noconvert(), ReleaseGil())
+      .def(
+          "robot_held", [](QuasiStatic& self, const OnePose& at) { return self.robot_held(pose(at)); },
+          "pose"_a.noconvert(), ReleaseGil())
+      .def(
+          "sweep",
+          [](QuasiStatic& self, const Poses& path, const PosesOut& objects, const FloatsOut<3>& out) {
+            const ArrayView<Pose, 2> swept(reinterpret_cast<Pose*>(out.data()),
+                                           {static_cast<Index>(out.shape(0)),
+                                            static_cast<Index>(out.shape(1))});
+            return self.sweep(poses(path), poses(objects), swept);
+          },
+          "path"_a.noconvert(), "poses"_a.noconvert(), "out"_a.noconvert(), ReleaseGil())
+      .def_prop_ro("tests", &QuasiStatic::tests);
+}
+
+}  // namespace pushplan::bindings
