@@ -1,9 +1,20 @@
 #include "arrays.hpp"
+#include "pushplan/interaction/ice.hpp"
 #include "pushplan/interaction/quasi_static.hpp"
 
 namespace pushplan::bindings {
 
 using namespace nb::literals;
+
+namespace {
+
+/// (N, K, 3) numbers as N rows of K poses.
+ArrayView<Pose, 2> pose_rows(const FloatsOut<3>& array) {
+  return {reinterpret_cast<Pose*>(array.data()),
+          {static_cast<Index>(array.shape(0)), static_cast<Index>(array.shape(1))}};
+}
+
+}  // namespace
 
 void bind_interaction(nb::module_& module) {
   nb::class_<Bodies>(module, "Bodies", "A robot, objects and walls.")
@@ -59,13 +70,45 @@ void bind_interaction(nb::module_& module) {
       .def(
           "sweep",
           [](QuasiStatic& self, const Poses& path, const PosesOut& objects, const FloatsOut<3>& out) {
-            const ArrayView<Pose, 2> swept(reinterpret_cast<Pose*>(out.data()),
-                                           {static_cast<Index>(out.shape(0)),
-                                            static_cast<Index>(out.shape(1))});
-            return self.sweep(poses(path), poses(objects), swept);
+            return self.sweep(poses(path), poses(objects), pose_rows(out));
           },
           "path"_a.noconvert(), "poses"_a.noconvert(), "out"_a.noconvert(), ReleaseGil())
       .def_prop_ro("tests", &QuasiStatic::tests);
+
+  nb::class_<IceBodies>(module, "IceBodies", "A hull among floes.")
+      .def(
+          "__init__",
+          [](IceBodies* self, const Points& hull_vertices, const Integers<1>& hull_offsets,
+             double hull_radius, const Points& vertices, const Integers<1>& offsets,
+             const Floats<1>& radii, const Floats<1>& masses, const Floats<1>& inverse_gyration) {
+            new (self) IceBodies{{points(hull_vertices), view(hull_offsets)},
+                                 hull_radius,
+                                 {points(vertices), view(offsets)},
+                                 view(radii),
+                                 view(masses),
+                                 view(inverse_gyration)};
+          },
+          "hull_vertices"_a.noconvert(), "hull_offsets"_a.noconvert(), "hull_radius"_a,
+          "vertices"_a.noconvert(), "offsets"_a.noconvert(), "radii"_a.noconvert(),
+          "masses"_a.noconvert(), "inverse_gyration"_a.noconvert(), nb::keep_alive<1, 2>(),
+          nb::keep_alive<1, 3>(), nb::keep_alive<1, 5>(), nb::keep_alive<1, 6>(),
+          nb::keep_alive<1, 7>(), nb::keep_alive<1, 8>(), nb::keep_alive<1, 9>());
+
+  nb::class_<IceContacts>(module, "IceContacts", "Floes that push floes, with memory for one thread.")
+      .def(
+          "__init__",
+          [](IceContacts* self, const IceBodies& bodies, double step, Index iterations,
+             double hull_friction, double friction, double still) {
+            new (self) IceContacts(bodies, {step, iterations, hull_friction, friction, still});
+          },
+          "bodies"_a, "step"_a, "iterations"_a, "hull_friction"_a, "friction"_a, "still"_a,
+          nb::keep_alive<1, 2>())
+      .def(
+          "sweep",
+          [](IceContacts& self, const Poses& path, const PosesOut& floes, const FloatsOut<3>& out) {
+            return self.sweep(poses(path), poses(floes), pose_rows(out));
+          },
+          "path"_a.noconvert(), "poses"_a.noconvert(), "out"_a.noconvert(), ReleaseGil());
 }
 
 }  // namespace pushplan::bindings
