@@ -71,6 +71,7 @@ inline constexpr auto kOwned = nb::rv_policy::move;
 
 using ReleaseGil = nb::call_guard<nb::gil_scoped_release>;
 
+void bind_geometry(nb::module_& module);
 void bind_gtsp(nb::module_& module);
 void bind_interaction(nb::module_& module);
 

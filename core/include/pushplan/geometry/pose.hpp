@@ -22,8 +22,31 @@ struct Pose {
   bool operator==(const Pose&) const = default;
 };
 
+struct Segment {
+  Vec2 from;
+  Vec2 to;
+};
+
+struct Box {
+  double x_min;
+  double y_min;
+  double x_max;
+  double y_max;
+
+  /// True if a point lies in the box grown by a margin on every side; its outline counts.
+  bool contains(Vec2 p, double margin) const {
+    return x_min - margin <= p.x && p.x <= x_max + margin && y_min - margin <= p.y &&
+           p.y <= y_max + margin;
+  }
+};
+
 /// Corners of a convex polygon, counter-clockwise.
 using Polygon = std::span<const Vec2>;
+
+/// The number of the corner after corner `i`.
+inline std::size_t next_corner(Polygon polygon, std::size_t i) {
+  return i + 1 < polygon.size() ? i + 1 : 0;
+}
 
 /// Polygons one after the other: number i has the vertices `offsets[i]` to `offsets[i + 1] - 1`.
 struct Polygons {
@@ -51,6 +74,21 @@ inline void transform(const Pose& pose, std::span<const Vec2> points, Vec2* out)
   for (const Vec2 p : points) {
     *out++ = {pose.x + c * p.x - s * p.y, pose.y + s * p.x + c * p.y};
   }
+}
+
+/// Carries the outlines of several bodies to the world, each from its own frame. `out` receives as
+/// many points as there are vertices.
+inline void transform(std::span<const Pose> poses, const Polygons& outlines, Vec2* out) {
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    transform(poses[k], outlines[static_cast<Index>(k)], out + outlines.offsets[k]);
+  }
+}
+
+/// The pose that a step [m] with a turn [rad] leads to: along the chord of the arc.
+inline Pose arc_step(const Pose& pose, double distance, double turn) {
+  const double heading = pose.theta + 0.5 * turn;
+  return {pose.x + distance * std::cos(heading), pose.y + distance * std::sin(heading),
+          pose.theta + turn};
 }
 
 }  // namespace pushplan

@@ -16,13 +16,6 @@
 
 namespace pushplan {
 
-struct Box {
-  double x_min;
-  double y_min;
-  double x_max;
-  double y_max;
-};
-
 /// A robot, K objects and walls.
 struct Bodies {
   Polygons robot;        // convex parts in its body frame

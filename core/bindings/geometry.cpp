@@ -1,0 +1,264 @@
+#include <nanobind/stl/tuple.h>
+
+#include <algorithm>
+#include <tuple>
+
+#include "arrays.hpp"
+#include "pushplan/geometry/convex.hpp"
+#include "pushplan/geometry/distance_field.hpp"
+#include "pushplan/geometry/obstacles.hpp"
+#include "pushplan/geometry/polygon.hpp"
+#include "pushplan/geometry/raster.hpp"
+#include "pushplan/geometry/regions.hpp"
+#include "pushplan/geometry/visibility.hpp"
+
+namespace pushplan::bindings {
+
+using namespace nb::literals;
+
+namespace {
+
+using Flags = nb::ndarray<bool, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using BoxArray = nb::ndarray<const double, nb::shape<4>, nb::c_contig, nb::device::cpu>;
+
+Box box(const BoxArray& array) {
+  return {array.data()[0], array.data()[1], array.data()[2], array.data()[3]};
+}
+
+/// The rows of an array as structs of as many numbers.
+template <class T>
+std::span<const T> rows(const Floats<2>& array) {
+  if (array.shape(1) * sizeof(double) != sizeof(T)) {
+    throw nb::type_error("an array has the wrong number of columns");
+  }
+  return {reinterpret_cast<const T*>(array.data()), array.shape(0)};
+}
+
+/// An array (N, 2) with these numbers.
+template <class Number, class Row>
+auto pairs(std::vector<Row> values) {
+  static_assert(sizeof(Row) == 2 * sizeof(Number));
+  auto* owned = new std::vector<Row>(std::move(values));
+  nb::capsule owner(owned, [](void* p) noexcept { delete static_cast<std::vector<Row>*>(p); });
+  return nb::ndarray<nb::numpy, Number, nb::shape<-1, 2>>(
+      reinterpret_cast<Number*>(owned->data()), {owned->size(), 2}, owner);
+}
+
+template <class T>
+void def_fill_convex(nb::module_& module) {
+  module.def(
+      "fill_convex",
+      [](const Array<T, 2>& image, const Points& corners, T value) {
+        fill_convex(view(image), points(corners), value);
+      },
+      "image"_a.noconvert(), "vertices_px"_a.noconvert(), "value"_a, ReleaseGil());
+}
+
+void bind_shapes(nb::module_& module) {
+  module.def(
+      "convex_penetration",
+      [](const Points& a, const Points& b) {
+        const Penetration found = convex_penetration(points(a), points(b));
+        return std::tuple(found.depth, found.normal.x, found.normal.y);
+      },
+      "a"_a.noconvert(), "b"_a.noconvert());
+  module.def(
+      "convex_overlap",
+      [](const Points& a, const Points& b) { return convex_overlap(points(a), points(b)); },
+      "a"_a.noconvert(), "b"_a.noconvert());
+  module.def(
+      "convex_distance",
+      [](const Points& a, const Points& b) { return convex_distance(points(a), points(b)); },
+      "a"_a.noconvert(), "b"_a.noconvert());
+  module.def(
+      "polygon_area", [](const Points& polygon) { return polygon_area(points(polygon)); },
+      "polygon"_a.noconvert());
+  module.def(
+      "polygon_centroid",
+      [](const Points& polygon) {
+        const Vec2 centre = polygon_centroid(points(polygon));
+        return std::tuple(centre.x, centre.y);
+      },
+      "polygon"_a.noconvert());
+  module.def(
+      "polygon_inertia", [](const Points& polygon) { return polygon_inertia(points(polygon)); },
+      "polygon"_a.noconvert());
+  module.def(
+      "transform_outlines",
+      [](const Poses& bodies, const Points& vertices, const Integers<1>& offsets,
+         const FloatsOut<2>& out) {
+        transform(poses(bodies), Polygons{points(vertices), view(offsets)},
+                  reinterpret_cast<Vec2*>(out.data()));
+      },
+      "poses"_a.noconvert(), "vertices"_a.noconvert(), "offsets"_a.noconvert(),
+      "out"_a.noconvert(), ReleaseGil());
+  module.def(
+      "arc_step",
+      [](const OnePose& from, double distance, double turn) {
+        const Pose to = arc_step(pose(from), distance, turn);
+        return std::tuple(to.x, to.y, to.theta);
+      },
+      "pose"_a.noconvert(), "distance"_a, "turn"_a);
+  def_fill_convex<bool>(module);
+  def_fill_convex<std::uint8_t>(module);
+  def_fill_convex<float>(module);
+  def_fill_convex<double>(module);
+}
+
+void bind_obstacles(nb::module_& module) {
+  nb::class_<Obstacles>(module, "Obstacles", "Convex cores, each with a radius around it.")
+      .def(
+          "__init__",
+          [](Obstacles* self, const Points& vertices, const Integers<1>& offsets,
+             const Floats<1>& radii, const Floats<2>& boxes) {
+            new (self) Obstacles{{points(vertices), view(offsets)}, view(radii), rows<Box>(boxes)};
+          },
+          "vertices"_a.noconvert(), "offsets"_a.noconvert(), "radii"_a.noconvert(),
+          "boxes"_a.noconvert(), nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(),
+          nb::keep_alive<1, 4>(), nb::keep_alive<1, 5>())
+      .def(
+          "distance",
+          [](const Obstacles& self, double x, double y) { return obstacle_distance({x, y}, self); },
+          "x"_a, "y"_a)
+      .def(
+          "line_of_sight",
+          [](const Obstacles& self, double px, double py, double qx, double qy, double margin) {
+            return line_of_sight({px, py}, {qx, qy}, self, margin);
+          },
+          "px"_a, "py"_a, "qx"_a, "qy"_a, "margin"_a)
+      .def(
+          "free_points",
+          [](const Obstacles& self, const Points& places, const BoxArray& bounds, double gap,
+             const Flags& keep) {
+            free_points(points(places), self, box(bounds), gap, {keep.data(), keep.shape(0)});
+          },
+          "points"_a.noconvert(), "box"_a.noconvert(), "gap"_a, "keep"_a.noconvert(), ReleaseGil())
+      .def(
+          "fill_clearance",
+          [](const Obstacles& self, const FloatsOut<2>& out, Index first, Index last, double x,
+             double y, double step) {
+            fill_clearance(view(out), first, last, {{x, y}, step}, self);
+          },
+          "out"_a.noconvert(), "first"_a, "last"_a, "x"_a, "y"_a, "step"_a, ReleaseGil());
+  module.def(
+      "core_distance",
+      [](double x, double y, const Points& core) { return core_distance({x, y}, points(core)); },
+      "x"_a, "y"_a, "core"_a.noconvert());
+}
+
+void bind_visibility(nb::module_& module) {
+  nb::class_<Regions>(module, "Regions", "A union of discs, half-planes and convex polygons.")
+      .def(
+          "__init__",
+          [](Regions* self, const Floats<2>& discs, const Floats<2>& half_planes,
+             const Points& vertices, const Integers<1>& offsets) {
+            new (self) Regions{rows<Disc>(discs), rows<HalfPlane>(half_planes),
+                               {points(vertices), view(offsets)}};
+          },
+          "discs"_a.noconvert(), "half_planes"_a.noconvert(), "vertices"_a.noconvert(),
+          "offsets"_a.noconvert(), nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(),
+          nb::keep_alive<1, 4>(), nb::keep_alive<1, 5>())
+      .def(
+          "nearest",
+          [](const Regions& self, Index k, double x, double y) {
+            const Vec2 nearest = nearest_in_region(k, {x, y}, self);
+            return std::tuple(nearest.x, nearest.y);
+          },
+          "k"_a, "x"_a, "y"_a);
+  nb::class_<Bends>(module, "Bends", "Places where a shortest path may bend.")
+      .def(
+          "__init__",
+          [](Bends* self, const Points& places, const Points& incoming, const Points& outgoing) {
+            new (self) Bends{points(places), points(incoming), points(outgoing)};
+          },
+          "points"_a.noconvert(), "incoming"_a.noconvert(), "outgoing"_a.noconvert(),
+          nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>());
+  nb::class_<Nodes>(module, "Nodes", "Bends and ends of paths, sorted by distance to the goal.")
+      .def(
+          "__init__",
+          [](Nodes* self, const Bends& bends, const Floats<1>& distances) {
+            new (self) Nodes{bends, view(distances)};
+          },
+          "bends"_a, "distances"_a.noconvert(), nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>());
+  nb::class_<GoalScene>(module, "GoalScene", "A goal among obstacles.")
+      .def(
+          "__init__",
+          [](GoalScene* self, const Regions& regions, const Obstacles& obstacles,
+             const BoxArray& bounds, double gap) {
+            new (self) GoalScene{regions, obstacles, box(bounds), gap};
+          },
+          "regions"_a, "obstacles"_a, "box"_a.noconvert(), "gap"_a, nb::keep_alive<1, 2>(),
+          nb::keep_alive<1, 3>())
+      .def(
+          "goal_leg",
+          [](const GoalScene& self, double x, double y) {
+            const GoalLeg leg = goal_leg({x, y}, self);
+            return std::tuple(leg.length, leg.end.x, leg.end.y);
+          },
+          "x"_a, "y"_a)
+      .def(
+          "goal_legs",
+          [](const GoalScene& self, const Points& places, const FloatsOut<2>& out) {
+            auto* leg = reinterpret_cast<GoalLeg*>(out.data());
+            for (const Vec2 p : points(places)) *leg++ = goal_leg(p, self);
+          },
+          "points"_a.noconvert(), "out"_a.noconvert(), ReleaseGil())
+      .def(
+          "node_leg",
+          [](const GoalScene& self, double x, double y, double limit, Index hint,
+             bool tangent_only, const Nodes& nodes) {
+            const NodeLeg leg =
+                node_leg({x, y}, limit, hint, tangent_only, nodes, self.obstacles, self.gap);
+            return std::tuple(leg.distance, leg.node);
+          },
+          "x"_a, "y"_a, "limit"_a, "hint"_a, "tangent_only"_a, "nodes"_a, ReleaseGil())
+      .def(
+          "fill_distances",
+          [](const GoalScene& self, const FloatsOut<2>& out, double x, double y, double step,
+             const Nodes& nodes, double sliver) {
+            fill_distances(view(out), {{x, y}, step}, nodes, self, sliver);
+          },
+          "out"_a.noconvert(), "x"_a, "y"_a, "step"_a, "nodes"_a, "sliver"_a, ReleaseGil());
+  module.def(
+      "visible_pairs",
+      [](const Bends& bends, const Obstacles& obstacles, double gap) {
+        VisiblePairs found;
+        {
+          nb::gil_scoped_release release;
+          found = visible_pairs(bends, obstacles, gap);
+        }
+        return std::tuple(pairs<Index>(std::move(found.pairs)),
+                          copied(std::span<const double>(found.lengths)));
+      },
+      "bends"_a, "obstacles"_a, "gap"_a);
+  module.def(
+      "relax",
+      [](const Integers<1>& starts, const Integers<1>& ends, const Floats<1>& lengths,
+         const FloatsOut<1>& distances, const IntegersOut<1>& parents) {
+        relax({view(starts), view(ends), view(lengths)}, view(distances), view(parents));
+      },
+      "starts"_a.noconvert(), "ends"_a.noconvert(), "lengths"_a.noconvert(),
+      "distances"_a.noconvert(), "parents"_a.noconvert(), ReleaseGil());
+  module.def(
+      "segment_crossings",
+      [](const Floats<2>& first, const Floats<2>& second) {
+        return pairs<double>(segment_crossings(rows<Segment>(first), rows<Segment>(second)));
+      },
+      "first"_a.noconvert(), "second"_a.noconvert());
+  module.def(
+      "sample",
+      [](const Floats<2>& values, double ox, double oy, double step, double x, double y) {
+        return sample(view(values), {{ox, oy}, step}, {x, y});
+      },
+      "values"_a.noconvert(), "ox"_a, "oy"_a, "step"_a, "x"_a, "y"_a);
+}
+
+}  // namespace
+
+void bind_geometry(nb::module_& module) {
+  bind_shapes(module);
+  bind_obstacles(module);
+  bind_visibility(module);
+}
+
+}  // namespace pushplan::bindings

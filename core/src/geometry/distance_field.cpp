@@ -1,0 +1,70 @@
+#include "pushplan/geometry/distance_field.hpp"
+
+#include <algorithm>
+#include <limits>
+
+namespace pushplan {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kSteepest = 1.5;  // difference of four neighbouring cells without a wall [steps]
+
+}  // namespace
+
+void fill_clearance(ArrayView<double, 2> out, Index first, Index last, const Cells& cells,
+                    const Obstacles& obstacles) {
+  const Index cols = out.extent(1);
+  for (Index at = first; at < last; ++at) {
+    out.data()[at] = obstacle_distance(cells.centre(at / cols, at % cols), obstacles);
+  }
+}
+
+void fill_distances(ArrayView<double, 2> out, const Cells& cells, const Nodes& nodes,
+                    const GoalScene& scene, double sliver) {
+  const Box& box = scene.box;
+  const double gap = scene.gap;
+  for (Index i = 0; i < out.extent(0); ++i) {
+    Index hint = kNoLeg;
+    for (Index j = 0; j < out.extent(1); ++j) {
+      const Vec2 p = cells.centre(i, j);
+      out(i, j) = kInfinity;
+      if (p.x > box.x_max + gap || p.y > box.y_max + gap) continue;
+      const double clearance = obstacle_distance(p, scene.obstacles);
+      if (clearance < gap) continue;
+      const double straight = goal_leg(p, scene).length;
+      const NodeLeg leg =
+          node_leg(p, straight, hint, clearance > sliver, nodes, scene.obstacles, gap);
+      hint = leg.node;
+      out(i, j) = leg.distance;
+    }
+  }
+}
+
+double sample(ArrayView<const double, 2> values, const Cells& cells, Vec2 p) {
+  const Index rows = values.extent(0);
+  const Index cols = values.extent(1);
+  double u = std::min(std::max((p.x - cells.origin.x) / cells.step, 0.0), static_cast<double>(cols));
+  double v = std::min(std::max((p.y - cells.origin.y) / cells.step, 0.0), static_cast<double>(rows));
+  const double own =
+      values(std::min(static_cast<Index>(v), rows - 1), std::min(static_cast<Index>(u), cols - 1));
+  u = std::max(u - 0.5, 0.0);
+  v = std::max(v - 0.5, 0.0);
+  const Index j0 = std::min(static_cast<Index>(u), cols - 1);
+  const Index i0 = std::min(static_cast<Index>(v), rows - 1);
+  const Index j1 = std::min(j0 + 1, cols - 1);
+  const Index i1 = std::min(i0 + 1, rows - 1);
+  const double a = values(i0, j0);
+  const double b = values(i0, j1);
+  const double c = values(i1, j0);
+  const double d = values(i1, j1);
+  const double low = std::min(std::min(a, b), std::min(c, d));
+  const double high = std::max(std::max(a, b), std::max(c, d));
+  if (high - low <= kSteepest * cells.step) {  // false if one is infinite
+    const double fu = u - static_cast<double>(j0);
+    const double fv = v - static_cast<double>(i0);
+    return (a * (1.0 - fu) + b * fu) * (1.0 - fv) + (c * (1.0 - fu) + d * fu) * fv;
+  }
+  return own < kInfinity ? own : low;
+}
+
+}  // namespace pushplan
