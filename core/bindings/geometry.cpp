@@ -6,11 +6,14 @@
 #include "arrays.hpp"
 #include "pushplan/geometry/convex.hpp"
 #include "pushplan/geometry/distance_field.hpp"
+#include "pushplan/geometry/obstacle_grid.hpp"
 #include "pushplan/geometry/obstacles.hpp"
 #include "pushplan/geometry/polygon.hpp"
 #include "pushplan/geometry/raster.hpp"
 #include "pushplan/geometry/regions.hpp"
+#include "pushplan/geometry/shadows.hpp"
 #include "pushplan/geometry/visibility.hpp"
+#include "pushplan/geometry/visibility_search.hpp"
 
 namespace pushplan::bindings {
 
@@ -253,12 +256,102 @@ void bind_visibility(nb::module_& module) {
       "values"_a.noconvert(), "ox"_a, "oy"_a, "step"_a, "x"_a, "y"_a);
 }
 
+void bind_search(nb::module_& module) {
+  nb::class_<ObstacleGrid>(module, "ObstacleGrid", "The obstacles that reach into each cell.")
+      .def(nb::init<const Obstacles&, double>(), "obstacles"_a, "margin"_a, nb::keep_alive<1, 2>())
+      .def_prop_ro("shape", [](const ObstacleGrid& s) { return std::tuple(s.rows(), s.columns()); })
+      .def_prop_ro("cell", &ObstacleGrid::cell)
+      .def_prop_ro("first", [](const ObstacleGrid& s) { return copied(s.first()); }, kOwned)
+      .def_prop_ro("items", [](const ObstacleGrid& s) { return copied(s.items()); }, kOwned);
+  nb::class_<GridSight>(module, "GridSight", "Tests of sight with memory for one thread.")
+      .def(nb::init<const ObstacleGrid&>(), "grid"_a, nb::keep_alive<1, 2>())
+      .def(
+          "sees",
+          [](GridSight& self, double px, double py, double qx, double qy, double margin) {
+            return self.sees({px, py}, {qx, qy}, margin);
+          },
+          "px"_a, "py"_a, "qx"_a, "qy"_a, "margin"_a);
+  nb::class_<Corners>(module, "Corners", "Corners by obstacle, then ends on the goal's rim.")
+      .def(
+          "__init__",
+          [](Corners* self, const Points& places, const Points& incoming, const Points& outgoing,
+             const Integers<1>& owner, const Integers<1>& first, const Points& middles,
+             const Points& halves) {
+            new (self) Corners{points(places), points(incoming), points(outgoing), view(owner),
+                               view(first),    points(middles),  points(halves)};
+          },
+          "points"_a.noconvert(), "incoming"_a.noconvert(), "outgoing"_a.noconvert(),
+          "owner"_a.noconvert(), "first"_a.noconvert(), "middles"_a.noconvert(),
+          "halves"_a.noconvert(), nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(),
+          nb::keep_alive<1, 4>(), nb::keep_alive<1, 5>(), nb::keep_alive<1, 6>(),
+          nb::keep_alive<1, 7>(), nb::keep_alive<1, 8>());
+  nb::enum_<VisibilitySearch::Outcome>(module, "SearchOutcome")
+      .value("FOUND", VisibilitySearch::Outcome::kFound)
+      .value("EXHAUSTED", VisibilitySearch::Outcome::kExhausted)
+      .value("PAUSED", VisibilitySearch::Outcome::kPaused);
+  nb::class_<VisibilitySearch>(module, "VisibilitySearch", "Lazy A* over the visibility graph.")
+      .def(
+          "__init__",
+          [](VisibilitySearch* self, double x, double y, const Corners& corners,
+             const GoalScene& scene, const ObstacleGrid& grid, double sliver) {
+            new (self) VisibilitySearch({x, y}, corners, scene, grid, sliver);
+          },
+          "x"_a, "y"_a, "corners"_a, "scene"_a, "grid"_a, "sliver"_a, nb::keep_alive<1, 4>(),
+          nb::keep_alive<1, 5>(), nb::keep_alive<1, 6>(), ReleaseGil())
+      .def("run", &VisibilitySearch::run, "budget"_a, ReleaseGil())
+      .def(
+          "exit_leg",
+          [](VisibilitySearch& self, double x, double y) {
+            const GoalLeg leg = self.exit_leg({x, y});
+            return std::tuple(leg.length, leg.end.x, leg.end.y);
+          },
+          "x"_a, "y"_a)
+      .def_prop_ro("end", &VisibilitySearch::end)
+      .def_prop_ro("lines_tested", &VisibilitySearch::lines_tested)
+      .def_prop_ro("parents", [](const VisibilitySearch& s) { return copied(s.parents()); }, kOwned);
+}
+
+void bind_shadows(nb::module_& module) {
+  module.def(
+      "fill_shadows",
+      [](const Array<std::uint8_t, 2>& mask, double x, double y, const Points& corners,
+         const Integers<1>& offsets, std::uint8_t value) {
+        ShadowPainter({points(corners), view(offsets)}).fill(view(mask), {x, y}, value);
+      },
+      "mask"_a.noconvert(), "x"_a, "y"_a, "corners"_a.noconvert(), "offsets"_a.noconvert(),
+      "value"_a, ReleaseGil());
+  module.def(
+      "fill_bend_distances",
+      [](const Array<float, 3>& table, double x, double y, double step, const Bends& bends,
+         const Floats<2>& between, const Points& corners, const Integers<1>& offsets, double gap) {
+        fill_bend_distances(view(table), {{x, y}, step}, bends, view(between),
+                            {points(corners), view(offsets)}, gap);
+      },
+      "table"_a.noconvert(), "x"_a, "y"_a, "step"_a, "bends"_a, "between"_a.noconvert(),
+      "corners"_a.noconvert(), "offsets"_a.noconvert(), "gap"_a, ReleaseGil());
+  module.def(
+      "bends_in_sight",
+      [](double x, double y, const Bends& bends, const Obstacles& obstacles, double gap,
+         double sliver) {
+        BendsInSight found;
+        {
+          nb::gil_scoped_release release;
+          found = bends_in_sight({x, y}, bends, obstacles, gap, sliver);
+        }
+        return std::tuple(copied(std::span<const Index>(found.bends)),
+                          copied(std::span<const double>(found.lengths)));
+      },
+      "x"_a, "y"_a, "bends"_a, "obstacles"_a, "gap"_a, "sliver"_a);
+}
+
 }  // namespace
 
 void bind_geometry(nb::module_& module) {
   bind_shapes(module);
   bind_obstacles(module);
   bind_visibility(module);
+  bind_search(module);
+  bind_shadows(module);
 }
 
 }  // namespace pushplan::bindings

@@ -1,0 +1,153 @@
+#include "pushplan/geometry/visibility_search.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace pushplan {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr Index kLineWork = 8;  // of a line tested or an expansion begun [corners looked at]
+
+std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+
+}  // namespace
+
+VisibilitySearch::VisibilitySearch(Vec2 start, const Corners& corners, const GoalScene& scene,
+                                   const ObstacleGrid& grid, double sliver)
+    : start_(start),
+      corners_(corners),
+      scene_(scene),
+      cell_(grid.cell()),
+      sliver_(sliver),
+      sight_(grid),
+      bounds_(corners.middles.size()),
+      done_(corners.points.size(), 0),
+      parents_(corners.points.size(), kStart) {
+  for (std::size_t k = 0; k < bounds_.size(); ++k) {
+    const double half = std::hypot(corners.halves[k].x, corners.halves[k].y);
+    bounds_[k] = region_distance(corners.middles[k], scene.regions) - half;
+  }
+  heap_.reserve(8 * corners.points.size() + 64);
+  expand(kStart, 0.0, -kInfinity);
+}
+
+Vec2 VisibilitySearch::place(Index node) const {
+  return node == kStart ? start_ : corners_.points[at(node)];
+}
+
+GoalLeg VisibilitySearch::exit_leg(Vec2 p) {
+  return goal_leg(p, scene_, [&](Vec2 from, Vec2 to) { return sight_.sees(from, to, scene_.gap); });
+}
+
+/// Puts a way of getting to a node into the heap.
+void VisibilitySearch::offer(Index node, double length, double bound, Index before, double limit) {
+  heap_.push_back({length + bound, entries_++, length, limit, node, before});
+  std::push_heap(heap_.begin(), heap_.end());
+}
+
+/// Offers the goal and corners that a common tangent leads to from a node. Only corners through
+/// which the goal is farther than `low` [m], -infinity at first, and not much farther; an entry
+/// stands for the rest.
+void VisibilitySearch::expand(Index node, double length, double low) {
+  const bool from_start = node == kStart;
+  const double gap = scene_.gap;
+  const Bends bends = corners_.bends();
+  const Vec2 p = place(node);
+  const Index own = from_start ? -1 : corners_.owner[at(node)];
+  const Vec2 in = from_start ? Vec2{0.0, 0.0} : corners_.incoming[at(node)];
+  const Vec2 out = from_start ? Vec2{0.0, 0.0} : corners_.outgoing[at(node)];
+  const double straight = region_distance(p, scene_.regions);
+  double high = straight + 2.0 * (low - straight);
+  bool rest = false;
+  if (low == -kInfinity) {
+    high = straight + cell_;
+    const double leg = exit_leg(p).length;
+    if (leg < kInfinity) offer(goal_node(), length + leg, 0.0, node);
+    for (std::size_t j = corners_.owner.size(); j < corners_.points.size(); ++j) {
+      const double dx = corners_.points[j].x - p.x;
+      const double dy = corners_.points[j].y - p.y;
+      if (from_start || bends.tangent({dx, dy}, at(node), gap)) {
+        offer(static_cast<Index>(j), length + std::hypot(dx, dy), 0.0, node);
+      }
+    }
+  }
+  const Obstacles& obstacles = scene_.obstacles;
+  for (std::size_t k = 0; k < corners_.middles.size(); ++k) {
+    const double mx = corners_.middles[k].x - p.x;
+    const double my = corners_.middles[k].y - p.y;
+    const Vec2 half = corners_.halves[k];
+    const double ax = std::max(std::abs(mx) - half.x, 0.0);
+    const double ay = std::max(std::abs(my) - half.y, 0.0);
+    const double away = high - bounds_[k];  // farther than that the goal is too far from its corners
+    if (away < 0.0 || ax * ax + ay * ay > away * away) {
+      rest = true;
+      continue;
+    }
+    bool every = static_cast<Index>(k) == own;
+    if (from_start) {
+      every = core_distance(p, obstacles.cores[static_cast<Index>(k)]) - obstacles.radii[k] <= sliver_;
+    } else if (!every) {
+      // the box around it must reach into where tangents at this corner lead
+      const double before = in.x * my - in.y * mx;
+      const double after = out.x * my - out.y * mx;
+      const double b = std::abs(in.x) * half.y + std::abs(in.y) * half.x + gap;
+      const double a = std::abs(out.x) * half.y + std::abs(out.y) * half.x + gap;
+      if (!((before >= -b && after <= a) || (before <= b && after >= -a))) continue;
+    }
+    for (std::size_t j = at(corners_.first[k]); j < at(corners_.first[k + 1]); ++j) {
+      if (done_[j]) continue;
+      const Vec2 q = corners_.points[j];
+      if (!scene_.box.contains(q, gap)) continue;
+      const double dx = q.x - p.x;
+      const double dy = q.y - p.y;
+      if (!every && !bends.tangent({-dx, -dy}, j, gap)) continue;
+      if (!from_start && !bends.tangent({dx, dy}, at(node), gap)) continue;
+      const double step = std::hypot(dx, dy);
+      const double bound = region_distance(q, scene_.regions);
+      if (step + bound > high) {
+        rest = true;
+      } else if (step + bound > low) {
+        offer(static_cast<Index>(j), length + step, bound, node);
+      }
+    }
+  }
+  if (rest) offer(rest_node(), length, high, node, high);
+}
+
+VisibilitySearch::Outcome VisibilitySearch::run(Index budget) {
+  const auto expansion = static_cast<Index>(corners_.middles.size()) + kLineWork;
+  while (budget > 0) {
+    if (heap_.empty()) return Outcome::kExhausted;
+    std::pop_heap(heap_.begin(), heap_.end());
+    const Entry entry = heap_.back();
+    heap_.pop_back();
+    --budget;
+    if (entry.node == goal_node()) {  // its line has been tested
+      end_ = entry.before;
+      return Outcome::kFound;
+    }
+    if (entry.node == rest_node()) {
+      expand(entry.before, entry.length, entry.limit);
+      budget -= expansion;
+      continue;
+    }
+    const std::size_t node = at(entry.node);
+    if (done_[node]) continue;
+    ++lines_tested_;
+    budget -= kLineWork;
+    if (!sight_.sees(place(entry.before), corners_.points[node], scene_.gap)) continue;
+    done_[node] = 1;
+    parents_[node] = entry.before;
+    if (node >= corners_.owner.size()) {
+      end_ = entry.node;
+      return Outcome::kFound;
+    }
+    expand(entry.node, entry.length, -kInfinity);
+    budget -= expansion;
+  }
+  return Outcome::kPaused;
+}
+
+}  // namespace pushplan
