@@ -52,7 +52,7 @@ void def_fill_convex(nb::module_& module) {
   module.def(
       "fill_convex",
       [](const Array<T, 2>& image, const Points& corners, T value) {
-        fill_convex(view(image), points(corners), value);
+        ConvexFiller().fill(view(image), points(corners), value);
       },
       "image"_a.noconvert(), "vertices_px"_a.noconvert(), "value"_a, ReleaseGil());
 }
@@ -102,10 +102,10 @@ void bind_shapes(nb::module_& module) {
         return std::tuple(to.x, to.y, to.theta);
       },
       "pose"_a.noconvert(), "distance"_a, "turn"_a);
-  def_fill_convex<bool>(module);
   def_fill_convex<std::uint8_t>(module);
   def_fill_convex<float>(module);
   def_fill_convex<double>(module);
+  def_fill_convex<bool>(module);
 }
 
 void bind_obstacles(nb::module_& module) {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "pushplan/rounding.hpp"
+
 namespace pushplan {
 namespace {
 
@@ -43,8 +45,8 @@ ObstacleGrid::ObstacleGrid(const Obstacles& obstacles, double margin) : obstacle
 }
 
 ObstacleGrid::Range ObstacleGrid::between(double low, double high, Index count) {
-  return {std::max(static_cast<Index>(std::floor(low - kRounding)), Index{0}),
-          std::min(static_cast<Index>(std::floor(high + kRounding)), count - 1)};
+  return {std::max(floor_index(low - kRounding), Index{0}),
+          std::min(floor_index(high + kRounding), count - 1)};
 }
 
 /// The rows of a column in which the core of obstacle `k` comes within `reach`.

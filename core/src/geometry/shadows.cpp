@@ -4,8 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "pushplan/geometry/raster.hpp"
-
 namespace pushplan {
 namespace {
 
@@ -105,7 +103,7 @@ void ShadowPainter::fill_one(ArrayView<std::uint8_t, 2> mask, Vec2 eye, Polygon 
   hull_.push_back({eye.x + mx * far / size, eye.y + my * far / size});
   hull_.push_back({eye.x + bx * b, eye.y + by * b});
   hull_.push_back(corners[last]);
-  fill_convex(mask, Polygon(hull_), value);
+  filler_.fill(mask, Polygon(hull_), value);
 }
 
 void fill_bend_distances(ArrayView<float, 3> table, const Cells& cells, const Bends& bends,

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "pushplan/geometry/distance_field.hpp"
+#include "pushplan/geometry/raster.hpp"
 #include "pushplan/geometry/visibility.hpp"
 
 namespace pushplan {
@@ -27,6 +28,7 @@ class ShadowPainter {
 
   Polygons polygons_;
   std::vector<Vec2> hull_;  // outline of a shadow
+  ConvexFiller filler_;
 };
 
 /// Writes for each cell the distance [m] to each bend, over the bends that the cell sees; infinite
