@@ -87,7 +87,8 @@ void VisibilitySearch::expand(Index node, double length, double low) {
     }
     bool every = static_cast<Index>(k) == own;
     if (from_start) {
-      every = core_distance(p, obstacles.cores[static_cast<Index>(k)]) - obstacles.radii[k] <= sliver_;
+      const Polygon core = obstacles.cores[static_cast<Index>(k)];
+      every = core_distance(p, core) - obstacles.radii[k] <= sliver_;
     } else if (!every) {
       // the box around it must reach into where tangents at this corner lead
       const double before = in.x * my - in.y * mx;
