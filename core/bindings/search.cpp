@@ -1,0 +1,62 @@
+#include "arrays.hpp"
+#include "pushplan/search/grid_dijkstra.hpp"
+#include "pushplan/search/search_tree.hpp"
+
+namespace pushplan::bindings {
+
+using namespace nb::literals;
+
+void bind_search(nb::module_& module) {
+  nb::class_<SearchTree>(module, "SearchTree", "Cheapest paths known so far, and the open nodes.")
+      .def(nb::init<Index>(), "size"_a)
+      .def("clear", &SearchTree::clear)
+      .def("offer", &SearchTree::offer, "node"_a, "cost"_a, "bound"_a, "parent"_a, "edge"_a)
+      .def("take", &SearchTree::take)
+      .def("known", &SearchTree::known, "node"_a)
+      .def("closed", &SearchTree::closed, "node"_a)
+      .def("cost", &SearchTree::cost, "node"_a)
+      .def("parent", &SearchTree::parent, "node"_a)
+      .def("edge", &SearchTree::edge, "node"_a)
+      .def("next", &SearchTree::next)
+      .def_prop_ro("open_count", &SearchTree::open_count)
+      .def_prop_ro("expanded", &SearchTree::expanded)
+      .def(
+          "path",
+          [](const SearchTree& self, Index node) {
+            const std::vector<SearchTree::Step> steps = self.path(node);
+            return copied_rows<Index>(std::span(steps));
+          },
+          "node"_a, kOwned, "(P, 2) nodes from a start on, and the labels of the edges to them.");
+
+  nb::class_<GridDijkstra>(module, "GridDijkstra", "Dijkstra's algorithm over the cells of a grid.")
+      .def(
+          "__init__",
+          [](GridDijkstra* self, const Floats<2>& weights, double cell,
+             const Integers<1>& starts) {
+            new (self) GridDijkstra(view(weights), cell, view(starts));
+          },
+          "weights"_a.noconvert(), "cell"_a, "starts"_a.noconvert(), nb::keep_alive<1, 2>())
+      .def(
+          "settle",
+          [](GridDijkstra& self, const Array<const bool, 2>& goals, Index upto) {
+            return self.settle(view(goals), upto);
+          },
+          "goals"_a.noconvert(), "upto"_a, ReleaseGil())
+      .def_prop_ro(
+          "costs",
+          [](const GridDijkstra& self) {
+            const auto costs = self.costs();
+            auto* owned = new std::vector<double>(costs.data(), costs.data() + costs.size());
+            nb::capsule owner(owned,
+                              [](void* p) noexcept { delete static_cast<std::vector<double>*>(p); });
+            return nb::ndarray<nb::numpy, double, nb::ndim<2>>(
+                owned->data(),
+                {static_cast<std::size_t>(costs.extent(0)), static_cast<std::size_t>(costs.extent(1))},
+                owner);
+          },
+          kOwned)
+      .def_prop_ro("parents", [](const GridDijkstra& self) { return copied(self.parents()); }, kOwned)
+      .def_prop_ro("order", [](const GridDijkstra& self) { return copied(self.order()); }, kOwned);
+}
+
+}  // namespace pushplan::bindings

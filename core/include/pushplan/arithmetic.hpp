@@ -1,0 +1,27 @@
+// Division that rounds down, for remainders that are never negative.
+#pragma once
+
+#include <cmath>
+
+#include "pushplan/array.hpp"
+
+namespace pushplan {
+
+/// The remainder of `a` by a positive `b`, in [0, b).
+inline double floor_mod(double a, double b) {
+  if (a >= 0.0 && a < b) return a + 0.0;  // no negative zero
+  const double rest = std::fmod(a, b);
+  if (rest == 0.0) return 0.0;
+  return rest < 0.0 ? rest + b : rest;
+}
+
+/// The same of whole numbers, in [0, b).
+constexpr Index floor_mod(Index a, Index b) {
+  const Index rest = a % b;
+  return rest < 0 ? rest + b : rest;
+}
+
+/// The quotient by a positive `b`, rounded down.
+constexpr Index floor_div(Index a, Index b) { return (a - floor_mod(a, b)) / b; }
+
+}  // namespace pushplan
