@@ -1,0 +1,36 @@
+// The goal of a robot: a disc, or everything beyond a line.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "pushplan/geometry/pose.hpp"
+
+namespace pushplan {
+
+struct GoalRegion {
+  enum class Kind { kDisc, kLine };
+
+  Kind kind;
+  Vec2 point;           // centre of the disc, or a point of the line [m]
+  Vec2 normal{};        // of a line, unit, towards the goal
+  double radius = 0.0;  // of a disc [m]
+
+  bool contains(Vec2 p) const {
+    const double dx = p.x - point.x;
+    const double dy = p.y - point.y;
+    if (kind == Kind::kDisc) return dx * dx + dy * dy <= radius * radius;
+    return dx * normal.x + dy * normal.y >= 0.0;
+  }
+
+  /// Distance [m] from a point; 0 inside.
+  double distance(Vec2 p) const {
+    const double dx = p.x - point.x;
+    const double dy = p.y - point.y;
+    const double gap = kind == Kind::kDisc ? std::sqrt(dx * dx + dy * dy) - radius
+                                           : -(dx * normal.x + dy * normal.y);
+    return std::max(gap, 0.0);
+  }
+};
+
+}  // namespace pushplan
