@@ -1,0 +1,264 @@
+#include <nanobind/stl/pair.h>
+
+#include "arrays.hpp"
+#include "pushplan/motion/goal_region.hpp"
+#include "pushplan/motion/shortcut.hpp"
+#include "pushplan/motion/state_lattice/cost_map.hpp"
+#include "pushplan/motion/state_lattice/place_costs.hpp"
+#include "pushplan/motion/state_lattice/pose_lattice.hpp"
+#include "pushplan/motion/state_lattice/primitives.hpp"
+#include "pushplan/motion/state_lattice/swaths.hpp"
+#include "pushplan/search/astar.hpp"
+
+namespace pushplan::bindings {
+
+using namespace nb::literals;
+
+namespace {
+
+using LatticeSearch = AStar<PoseLattice>;
+
+PathBuffer buffer(const PosesOut& out, const FloatsOut<1>& curvatures) {
+  return {poses(out), view(curvatures)};
+}
+
+/// A goal as `goal_numbers` of Python gives it.
+GoalRegion goal_region(const Floats<1>& numbers) {
+  const double* n = numbers.data();
+  if (n[0] == 0.0) return {GoalRegion::Kind::kDisc, {n[1], n[2]}, {0.0, 0.0}, n[3]};
+  return {GoalRegion::Kind::kLine, {n[1], n[2]}, {n[3], n[4]}, 0.0};
+}
+
+/// The numbers of `PoseLattice.goal` of Python.
+LatticeGoal lattice_goal(const Floats<1>& numbers) {
+  const double* n = numbers.data();
+  return {n[0] == 0.0, n[1], n[2], n[3]};
+}
+
+void bind_paths(nb::module_& module) {
+  module.def(
+      "dubins",
+      [](const OnePose& start, const OnePose& end, double radius, const FloatsOut<2>& arcs) {
+        const DubinsPath path = dubins(pose(start), pose(end), radius);
+        std::copy(path.arcs.begin(), path.arcs.end(), reinterpret_cast<Arc*>(arcs.data()));
+        return path.length;
+      },
+      "start"_a.noconvert(), "end"_a.noconvert(), "radius"_a, "arcs"_a.noconvert());
+  module.def(
+      "along_arc",
+      [](const OnePose& start, double length, double curvature, const FloatsOut<1>& out) {
+        *reinterpret_cast<Pose*>(out.data()) = along_arc(pose(start), {length, curvature});
+      },
+      "start"_a.noconvert(), "length"_a, "curvature"_a, "out"_a.noconvert());
+  module.def("step_along", &step_along, "curvature"_a, "spacing"_a);
+  module.def(
+      "sample_pieces",
+      [](const OnePose& start, const Floats<2>& arcs, double spacing, const PosesOut& out,
+         const FloatsOut<1>& curvatures) {
+        return sample_arcs(pose(start), rows_as<const Arc>(arcs), spacing, buffer(out, curvatures));
+      },
+      "start"_a.noconvert(), "pieces"_a.noconvert(), "spacing"_a, "out"_a.noconvert(),
+      "curvatures"_a.noconvert());
+  module.def(
+      "in_goal",
+      [](double x, double y, const Floats<1>& goal) { return goal_region(goal).contains({x, y}); },
+      "x"_a, "y"_a, "goal"_a.noconvert());
+  module.def(
+      "distance_to_goal",
+      [](double x, double y, const Floats<1>& goal) { return goal_region(goal).distance({x, y}); },
+      "x"_a, "y"_a, "goal"_a.noconvert());
+  module.def(
+      "displace",
+      [](const OnePose& at, double sideways, double turn, const FloatsOut<1>& out) {
+        *reinterpret_cast<Pose*>(out.data()) = displace(pose(at), sideways, turn);
+      },
+      "pose"_a.noconvert(), "sideways"_a, "turn"_a, "out"_a.noconvert());
+  module.def(
+      "copy_start",
+      [](const Poses& path, const Floats<1>& curvatures, Index last, const PosesOut& out,
+         const FloatsOut<1>& out_curvatures) {
+        return copy_start({poses(path), view(curvatures)}, last, buffer(out, out_curvatures));
+      },
+      "poses"_a.noconvert(), "curvatures"_a.noconvert(), "last"_a, "out"_a.noconvert(),
+      "out_curvatures"_a.noconvert());
+  module.def(
+      "lay_dubins",
+      [](const OnePose& start, const OnePose& end, double radius, double spacing,
+         double most_turn, const PosesOut& out, const FloatsOut<1>& curvatures) {
+        return lay_dubins(pose(start), pose(end), {radius, spacing, most_turn},
+                          buffer(out, curvatures));
+      },
+      "start"_a.noconvert(), "end"_a.noconvert(), "radius"_a, "spacing"_a, "most_turn"_a,
+      "out"_a.noconvert(), "curvatures"_a.noconvert());
+  module.def(
+      "copy_rest",
+      [](const Poses& path, const Floats<1>& curvatures, Index last, const PosesOut& out,
+         const FloatsOut<1>& out_curvatures, Index size) {
+        return copy_rest({poses(path), view(curvatures)}, last, buffer(out, out_curvatures), size);
+      },
+      "poses"_a.noconvert(), "curvatures"_a.noconvert(), "last"_a, "out"_a.noconvert(),
+      "out_curvatures"_a.noconvert(), "size"_a);
+}
+
+void bind_maps(nb::module_& module) {
+  module.def(
+      "add_floes",
+      [](const Points& outlines, const Integers<1>& offsets, const Points& centres,
+         const Floats<1>& radii, const Floats<1>& totals, double exponent, double soft,
+         const FloatsOut<2>& grid) {
+        add_floes({{points(outlines), view(offsets)},
+                   points(centres),
+                   view(radii),
+                   {view(totals), exponent, soft}},
+                  view(grid));
+      },
+      "outlines"_a.noconvert(), "offsets"_a.noconvert(), "centres"_a.noconvert(),
+      "radii"_a.noconvert(), "totals"_a.noconvert(), "exponent"_a, "soft"_a,
+      "grid"_a.noconvert(), ReleaseGil());
+  module.def(
+      "block",
+      [](const Points& outlines, const Integers<1>& offsets, double margin,
+         const FloatsOut<2>& grid) {
+        block_cells({points(outlines), view(offsets)}, margin, view(grid));
+      },
+      "outlines"_a.noconvert(), "offsets"_a.noconvert(), "margin"_a, "grid"_a.noconvert(),
+      ReleaseGil());
+  module.def(
+      "prefix_sums",
+      [](const Floats<2>& grid, const FloatsOut<2>& sums) { prefix_sums(view(grid), view(sums)); },
+      "grid"_a.noconvert(), "sums"_a.noconvert(), ReleaseGil());
+  module.def(
+      "place_costs",
+      [](const Floats<2>& sums, const Integers<1>& rows, Index goal_row,
+         const Integers<1>& columns, std::pair<Index, Index> between, Index half, Index reach,
+         Index along, Index stage, double factor, double cell, double lean,
+         const FloatsOut<2>& costs) {
+        place_costs(view(sums),
+                    {view(rows), view(columns), goal_row, between.first, between.second},
+                    {half, reach, along, stage, factor, cell, lean}, view(costs));
+      },
+      "sums"_a.noconvert(), "rows"_a.noconvert(), "goal_row"_a, "columns"_a.noconvert(),
+      "between"_a, "half"_a, "reach"_a, "along"_a, "stage"_a, "factor"_a, "cell"_a, "lean"_a,
+      "costs"_a.noconvert(), ReleaseGil());
+}
+
+void bind_primitives(nb::module_& module) {
+  module.def(
+      "fill_connections",
+      [](double heading, double target, double radius, Index reach, double slack,
+         const FloatsOut<2>& out) {
+        return find_connections(heading, target, {radius, reach, slack}, rows_as<Connection>(out));
+      },
+      "heading"_a, "target"_a, "radius"_a, "reach"_a, "slack"_a, "out"_a.noconvert(), ReleaseGil());
+  module.def(
+      "primitive_boxes",
+      [](const Floats<1>& headings, const Floats<3>& pieces, const Floats<1>& lengths,
+         const FloatsOut<2>& boxes) {
+        primitive_boxes(view(headings), rows_as<const std::array<Arc, 3>>(pieces), view(lengths),
+                        rows_as<OriginBox>(boxes));
+      },
+      "headings"_a.noconvert(), "pieces"_a.noconvert(), "lengths"_a.noconvert(),
+      "boxes"_a.noconvert(), ReleaseGil());
+  module.def(
+      "sweep_cells",
+      [](double heading, const Floats<2>& pieces, const Points& vertices,
+         const Integers<1>& offsets, double reach, double spacing) {
+        std::vector<ColumnRun> runs;
+        {
+          nb::gil_scoped_release released;
+          runs = sweep_cells(heading, rows_as<const Arc>(pieces), {points(vertices), view(offsets)},
+                             reach, spacing);
+        }
+        return copied_rows<Index>(std::span<const ColumnRun>(runs));
+      },
+      "heading"_a, "pieces"_a.noconvert(), "vertices"_a.noconvert(), "offsets"_a.noconvert(),
+      "reach"_a, "spacing"_a, kOwned);
+}
+
+void bind_lattice(nb::module_& module) {
+  nb::class_<PoseLattice>(module, "PoseLattice",
+                          "Places and headings joined by motion primitives.")
+      .def(
+          "__init__",
+          [](PoseLattice* self, Index rows, Index columns, double step, Index cells,
+             const Integers<1>& corner, const Integers<1>& first, const Integers<2>& ends,
+             const Floats<1>& lengths, const Floats<2>& boxes, const Integers<1>& run_first,
+             const Integers<2>& runs, const Floats<1>& cost_sums, const Floats<1>& blocked_sums,
+             Index stride, const Floats<2>& planes, const Floats<1>& goal,
+             const Floats<2>& row_bounds, const Floats<2>& place_costs, double inflation) {
+            new (self) PoseLattice{rows,
+                                   columns,
+                                   step,
+                                   cells,
+                                   corner.data()[0],
+                                   corner.data()[1],
+                                   view(first),
+                                   rows_as<const PrimitiveEnd>(ends),
+                                   view(lengths),
+                                   rows_as<const OriginBox>(boxes),
+                                   view(run_first),
+                                   rows_as<const SwathRun>(runs),
+                                   view(cost_sums),
+                                   view(blocked_sums),
+                                   stride,
+                                   rows_as<const HalfPlane>(planes),
+                                   lattice_goal(goal),
+                                   view(row_bounds),
+                                   view(place_costs),
+                                   inflation};
+          },
+          "rows"_a, "columns"_a, "step"_a, "cells"_a, "corner"_a.noconvert(),
+          "first"_a.noconvert(), "ends"_a.noconvert(), "lengths"_a.noconvert(),
+          "boxes"_a.noconvert(), "run_first"_a.noconvert(), "runs"_a.noconvert(),
+          "cost_sums"_a.noconvert(), "blocked_sums"_a.noconvert(), "stride"_a,
+          "planes"_a.noconvert(), "goal"_a.noconvert(), "row_bounds"_a.noconvert(),
+          "place_costs"_a.noconvert(), "inflation"_a, nb::keep_alive<1, 7>(),
+          nb::keep_alive<1, 8>(), nb::keep_alive<1, 9>(), nb::keep_alive<1, 10>(),
+          nb::keep_alive<1, 11>(), nb::keep_alive<1, 12>(), nb::keep_alive<1, 13>(),
+          nb::keep_alive<1, 14>(), nb::keep_alive<1, 16>(), nb::keep_alive<1, 18>(),
+          nb::keep_alive<1, 19>())
+      .def("estimate", &PoseLattice::estimate, "node"_a)
+      .def("is_goal", &PoseLattice::is_goal, "node"_a)
+      .def("edge_cost", &PoseLattice::edge_cost, "row"_a, "column"_a, "primitive"_a)
+      .def(
+          "within",
+          [](const PoseLattice& self, Index u, Index v, const Floats<1>& box) {
+            return within(self.planes, u, v, *reinterpret_cast<const OriginBox*>(box.data()));
+          },
+          "row"_a, "column"_a, "box"_a.noconvert());
+  module.def(
+      "swath_sum",
+      [](const Floats<1>& sums, const Integers<2>& runs, Index begin, Index end, Index at) {
+        const auto all = rows_as<const SwathRun>(runs);
+        return swath_sum(view(sums),
+                         all.subspan(static_cast<std::size_t>(begin),
+                                     static_cast<std::size_t>(end - begin)),
+                         at);
+      },
+      "sums"_a.noconvert(), "runs"_a.noconvert(), "begin"_a, "end"_a, "at"_a);
+
+  nb::class_<LatticeSearch>(module, "LatticeSearch", "A* over a `PoseLattice`.")
+      .def(nb::init<PoseLattice, Index>(), "lattice"_a, "size"_a, nb::keep_alive<1, 2>())
+      .def("restart", &LatticeSearch::restart, "lattice"_a, nb::keep_alive<1, 2>())
+      .def("start", &LatticeSearch::start, "node"_a, "cost"_a = 0.0, "bound"_a = 0.0,
+           "edge"_a = -1)
+      .def(
+          "run", [](LatticeSearch& self, Index budget) { return static_cast<int>(self.run(budget)); },
+          "budget"_a, ReleaseGil(), "0: no path exists; 1: the goal was reached; 2: paused.")
+      .def_prop_ro("goal", &LatticeSearch::goal)
+      .def_prop_ro("cost", &LatticeSearch::cost)
+      .def_prop_ro("generated", &LatticeSearch::generated)
+      .def_prop_ro("tree", [](LatticeSearch& self) -> SearchTree& { return self.tree(); },
+                   nb::rv_policy::reference_internal);
+}
+
+}  // namespace
+
+void bind_motion(nb::module_& module) {
+  bind_paths(module);
+  bind_maps(module);
+  bind_primitives(module);
+  bind_lattice(module);
+}
+
+}  // namespace pushplan::bindings
