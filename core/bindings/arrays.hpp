@@ -71,8 +71,30 @@ inline constexpr auto kOwned = nb::rv_policy::move;
 
 using ReleaseGil = nb::call_guard<nb::gil_scoped_release>;
 
+/// Rows of an array as structures of the same numbers.
+template <class T, class Array>
+std::span<T> rows_as(const Array& array) {
+  return {reinterpret_cast<T*>(array.data()), array.shape(0)};
+}
+
+/// A NumPy array with a copy of structures of `Number`, a row for each.
+template <class Number, class T>
+auto copied_rows(std::span<const T> values) {
+  constexpr std::size_t kColumns = sizeof(T) / sizeof(Number);
+  const auto* numbers = reinterpret_cast<const Number*>(values.data());
+  auto* owned = new std::vector<Number>(numbers, numbers + kColumns * values.size());
+  nb::capsule owner(owned, [](void* p) noexcept { delete static_cast<std::vector<Number>*>(p); });
+  return nb::ndarray<nb::numpy, Number, nb::ndim<2>>(owned->data(), {values.size(), kColumns}, owner);
+}
+
 void bind_geometry(nb::module_& module);
 void bind_gtsp(nb::module_& module);
 void bind_interaction(nb::module_& module);
+void bind_envs(nb::module_& module);
+void bind_learned(nb::module_& module);
+void bind_motion(nb::module_& module);
+void bind_observation(nb::module_& module);
+void bind_scenarios(nb::module_& module);
+void bind_search(nb::module_& module);
 
 }  // namespace pushplan::bindings

@@ -8,4 +8,16 @@ NB_MODULE(_core, module) {
   pushplan::bindings::bind_gtsp(gtsp);
   auto interaction = module.def_submodule("interaction", "Models of what the robot pushes.");
   pushplan::bindings::bind_interaction(interaction);
+  auto envs = module.def_submodule("envs", "Parts of simulators.");
+  pushplan::bindings::bind_envs(envs);
+  auto learned = module.def_submodule("learned", "What learned policies observe.");
+  pushplan::bindings::bind_learned(learned);
+  auto motion = module.def_submodule("motion", "Arcs, shortcuts and state lattices.");
+  pushplan::bindings::bind_motion(motion);
+  auto observation = module.def_submodule("observation", "Worlds drawn into images.");
+  pushplan::bindings::bind_observation(observation);
+  auto scenarios = module.def_submodule("scenarios", "Steps of the ice generator.");
+  pushplan::bindings::bind_scenarios(scenarios);
+  auto search = module.def_submodule("search", "Shortest paths on graphs.");
+  pushplan::bindings::bind_search(search);
 }
