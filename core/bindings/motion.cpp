@@ -217,6 +217,20 @@ void bind_lattice(nb::module_& module) {
           nb::keep_alive<1, 11>(), nb::keep_alive<1, 12>(), nb::keep_alive<1, 13>(),
           nb::keep_alive<1, 14>(), nb::keep_alive<1, 16>(), nb::keep_alive<1, 18>(),
           nb::keep_alive<1, 19>())
+      .def(
+          "successors",
+          [](const PoseLattice& self, Index node, const IntegersOut<1>& nodes,
+             const FloatsOut<1>& costs, const IntegersOut<1>& edges) {
+            Index count = 0;
+            self.expand(node, [&](Index successor, double cost, Index edge) {
+              nodes.data()[count] = successor;
+              costs.data()[count] = cost;
+              edges.data()[count] = edge;
+              ++count;
+            });
+            return count;
+          },
+          "node"_a, "nodes"_a.noconvert(), "costs"_a.noconvert(), "edges"_a.noconvert())
       .def("estimate", &PoseLattice::estimate, "node"_a)
       .def("is_goal", &PoseLattice::is_goal, "node"_a)
       .def("edge_cost", &PoseLattice::edge_cost, "row"_a, "column"_a, "primitive"_a)

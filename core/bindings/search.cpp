@@ -18,6 +18,13 @@ void bind_search(nb::module_& module) {
       .def("parent", &SearchTree::parent, "node"_a)
       .def("edge", &SearchTree::edge, "node"_a)
       .def("next", &SearchTree::next)
+      .def_prop_ro(
+          "open_nodes",
+          [](const SearchTree& self) {
+            const std::vector<Index> nodes = self.open_nodes();
+            return copied(std::span<const Index>(nodes));
+          },
+          kOwned)
       .def_prop_ro("open_count", &SearchTree::open_count)
       .def_prop_ro("expanded", &SearchTree::expanded)
       .def(

@@ -110,25 +110,6 @@ DubinsPath dubins(const Pose& start, const Pose& end, double radius) {
   return path;
 }
 
-Pose along_arc(const Pose& start, const Arc& arc) {
-  if (std::isinf(arc.curvature)) {
-    return {start.x, start.y, start.theta + arc.length * (arc.curvature > 0.0 ? 1.0 : -1.0)};
-  }
-  const double turn = arc.length * arc.curvature;
-  const double half = 0.5 * turn;
-  // chord of the arc; sin(x) / x keeps the straight limit exact
-  const double chord =
-      std::abs(half) < 1e-9 ? arc.length : arc.length * std::sin(half) / half;
-  const double heading = start.theta + half;
-  return {start.x + chord * std::cos(heading), start.y + chord * std::sin(heading),
-          start.theta + turn};
-}
-
-double step_along(double curvature, double spacing) {
-  if (std::isinf(curvature)) return kMaxTurn;
-  return std::min(spacing, kMaxTurn / std::max(std::abs(curvature), 1e-12));
-}
-
 Index sample_arcs(const Pose& start, std::span<const Arc> arcs, double spacing,
                   const PathBuffer& out) {
   Index count = 0;

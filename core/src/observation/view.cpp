@@ -9,8 +9,9 @@ using local::fill_convex;
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
+/// The nearest of `count` cells; truncation rounds down what is not negative.
 Index cell_at(double place, Index count) {
-  return std::min(std::max(static_cast<Index>(std::floor(place)), Index{0}), count - 1);
+  return static_cast<Index>(std::min(std::max(0.0, place), static_cast<double>(count - 1)));
 }
 
 }  // namespace

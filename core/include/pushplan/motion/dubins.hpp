@@ -1,7 +1,9 @@
 // Arcs, and the shortest forward paths of bounded curvature (Dubins 1957).
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <span>
 
 #include "pushplan/geometry/pose.hpp"
@@ -55,10 +57,25 @@ inline constexpr double kMaxTurn = 0.15;
 DubinsPath dubins(const Pose& start, const Pose& end, double radius);
 
 /// The pose at the end of an arc.
-Pose along_arc(const Pose& start, const Arc& arc);
+inline Pose along_arc(const Pose& start, const Arc& arc) {
+  if (std::isinf(arc.curvature)) {
+    return {start.x, start.y, start.theta + arc.length * (arc.curvature > 0.0 ? 1.0 : -1.0)};
+  }
+  const double turn = arc.length * arc.curvature;
+  const double half = 0.5 * turn;
+  // chord of the arc; sin(x) / x keeps the straight limit exact
+  const double chord =
+      std::abs(half) < 1e-9 ? arc.length : arc.length * std::sin(half) / half;
+  const double heading = start.theta + half;
+  return {start.x + chord * std::cos(heading), start.y + chord * std::sin(heading),
+          start.theta + turn};
+}
 
 /// Distance between poses on an arc [m]: `spacing`, less where that would turn too far.
-double step_along(double curvature, double spacing);
+inline double step_along(double curvature, double spacing) {
+  if (std::isinf(curvature)) return kMaxTurn;
+  return std::min(spacing, kMaxTurn / std::max(std::abs(curvature), 1e-12));
+}
 
 /// Lays poses along arcs, without the start itself, at most `spacing` [m] apart, less in tight
 /// turns. Returns their number, or -1 if `out` is too short.

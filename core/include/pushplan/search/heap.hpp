@@ -25,6 +25,14 @@ class NodeHeap {
   Index size() const { return static_cast<Index>(entries_.size()); }
   /// The node of the least key; the heap must not be empty.
   Index least() const { return entries_.front().node; }
+  /// All nodes, the least first and the others in the order of the heap.
+  std::vector<Index> nodes() const {
+    std::vector<Index> all;
+    all.reserve(entries_.size());
+    for (const Entry& entry : entries_) all.push_back(entry.node);
+    return all;
+  }
+
   /// Forgets all nodes, but not their places.
   void clear() { entries_.clear(); }
 

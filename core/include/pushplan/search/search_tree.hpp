@@ -71,6 +71,8 @@ class SearchTree {
   bool exhausted() const { return open_.empty(); }
   /// Number of open nodes.
   Index open_count() const { return open_.size(); }
+  /// The open nodes, the one that `take` would return first.
+  std::vector<Index> open_nodes() const { return open_.nodes(); }
   /// The node that `take` would return; one must be open.
   Index next() const { return open_.least(); }
   /// Number of nodes taken so far; a node may be taken again at a lower cost.
