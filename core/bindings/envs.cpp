@@ -53,7 +53,7 @@ void bind_envs(nb::module_& module) {
              const Integers<1>& core_offsets, const Floats<1>& core_radii) {
             return self.clear_time(pose(robot), {course, linear, angular, holds}, limit, margin,
                                    poses(objects),
-                                   {{points(cores), view(core_offsets)}, view(core_radii)});
+                                   {{points(cores), view(core_offsets)}, view(core_radii), {}});
           },
           "robot"_a.noconvert(), "course"_a, "linear"_a, "angular"_a, "holds"_a, "limit"_a,
           "margin"_a, "poses"_a.noconvert(), "cores"_a.noconvert(), "core_offsets"_a.noconvert(),

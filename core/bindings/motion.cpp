@@ -1,6 +1,7 @@
 #include <nanobind/stl/pair.h>
 
 #include "arrays.hpp"
+#include "goal.hpp"
 #include "pushplan/motion/goal_region.hpp"
 #include "pushplan/motion/shortcut.hpp"
 #include "pushplan/motion/state_lattice/cost_map.hpp"
@@ -20,13 +21,6 @@ using LatticeSearch = AStar<PoseLattice>;
 
 PathBuffer buffer(const PosesOut& out, const FloatsOut<1>& curvatures) {
   return {poses(out), view(curvatures)};
-}
-
-/// A goal as `goal_numbers` of Python gives it.
-GoalRegion goal_region(const Floats<1>& numbers) {
-  const double* n = numbers.data();
-  if (n[0] == 0.0) return {GoalRegion::Kind::kDisc, {n[1], n[2]}, {0.0, 0.0}, n[3]};
-  return {GoalRegion::Kind::kLine, {n[1], n[2]}, {n[3], n[4]}, 0.0};
 }
 
 /// The numbers of `PoseLattice.goal` of Python.
@@ -201,7 +195,7 @@ void bind_lattice(nb::module_& module) {
                                    view(cost_sums),
                                    view(blocked_sums),
                                    stride,
-                                   rows_as<const HalfPlane>(planes),
+                                   rows_as<const OriginLimit>(planes),
                                    lattice_goal(goal),
                                    view(row_bounds),
                                    view(place_costs),

@@ -1,4 +1,4 @@
-// Division that rounds down, for remainders that are never negative.
+// Division and rounding to whole numbers. Division rounds down: remainders are never negative.
 #pragma once
 
 #include <cmath>
@@ -23,5 +23,19 @@ constexpr Index floor_mod(Index a, Index b) {
 
 /// The quotient by a positive `b`, rounded down.
 constexpr Index floor_div(Index a, Index b) { return (a - floor_mod(a, b)) / b; }
+
+// Without the calls that std::floor and std::ceil are on old processors.
+
+/// The greatest index that is not above `x`.
+inline Index floor_index(double x) {
+  const auto truncated = static_cast<Index>(x);
+  return truncated - (static_cast<double>(truncated) > x ? 1 : 0);
+}
+
+/// The least index that is not below `x`.
+inline Index ceil_index(double x) {
+  const auto truncated = static_cast<Index>(x);
+  return truncated + (static_cast<double>(truncated) < x ? 1 : 0);
+}
 
 }  // namespace pushplan

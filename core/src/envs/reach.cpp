@@ -4,14 +4,10 @@
 #include <cmath>
 #include <limits>
 
-#include "../local_geometry.hpp"
+#include "pushplan/geometry/convex.hpp"
 
 namespace pushplan {
 namespace {
-
-using local::convex_distance;
-using local::convex_overlap;
-using local::core_distance;
 
 constexpr int kAdvances = 64;  // looks at the gap at most
 
@@ -82,7 +78,7 @@ void Reach::within(const Pose& robot, double reach, std::span<const Pose> object
 }
 
 double Reach::clear_time(const Pose& robot, const ArcMotion& motion, double limit, double margin,
-                         std::span<const Pose> objects, const GrownCores& obstacles) {
+                         std::span<const Pose> objects, const Obstacles& obstacles) {
   const auto& radii = shapes_.radii;
   const double speed = std::abs(motion.linear) + std::abs(motion.angular) * size_;
   const double reach = speed * limit + margin;

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "pushplan/rounding.hpp"
+#include "pushplan/arithmetic.hpp"
 
 namespace pushplan {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <limits>
 
-#include "shadow.hpp"
+#include "pushplan/geometry/shadows.hpp"
 
 namespace pushplan {
 
@@ -16,11 +16,7 @@ void fill_hidden(Image image, const ImageView& view, Vec2 eye, const Sight& sigh
   to_pixels(view, {&eye, 1}, &at);
   std::vector<std::uint8_t> shadow(static_cast<std::size_t>(rows * cols), 0);
   const Image hidden(shadow.data(), {rows, cols});
-  const Polygons loops{spots, sight.loops.offsets};
-  std::vector<Vec2> hull;
-  for (Index k = 0; k < loops.count(); ++k) {
-    local::fill_shadow(hidden, at, loops[k], std::uint8_t{1}, hull);
-  }
+  ShadowPainter({spots, sight.loops.offsets}).fill(hidden, at, 1);
   const double c = std::cos(view.window.theta);
   const double s = std::sin(view.window.theta);
   const auto table_rows = static_cast<double>(sight.table.extent(0));

@@ -1,11 +1,9 @@
 #include "pushplan/observation/view.hpp"
 
-#include "../local_geometry.hpp"
+#include "pushplan/geometry/raster.hpp"
 
 namespace pushplan {
 namespace {
-
-using local::fill_convex;
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
@@ -20,13 +18,15 @@ void fill_parts(Image image, const ImageView& view, const Polygons& parts, std::
   std::vector<Vec2> spots(parts.vertices.size());
   to_pixels(view, parts.vertices, spots.data());
   const Polygons drawn{spots, parts.offsets};
-  for (Index k = 0; k < drawn.count(); ++k) fill_convex(image, drawn[k], value);
+  ConvexFiller filler;
+  for (Index k = 0; k < drawn.count(); ++k) filler.fill(image, drawn[k], value);
 }
 
 void fill_bodies(Image image, const ImageView& view, std::span<const Pose> poses,
                  const Polygons& outlines, std::span<const double> radii, std::uint8_t value) {
   const double reach = 0.5 * std::hypot(view.rows * view.step_up, view.cols * view.step_across);
   std::vector<Vec2> corners(outlines.vertices.size());
+  ConvexFiller filler;
   for (Index k = 0; k < static_cast<Index>(poses.size()); ++k) {
     const Pose& pose = poses[at(k)];
     const double far = reach + radii[at(k)];
@@ -37,7 +37,7 @@ void fill_bodies(Image image, const ImageView& view, std::span<const Pose> poses
     transform(pose, body, corners.data());
     const Polygon drawn(corners.data(), body.size());
     to_pixels(view, drawn, corners.data());
-    fill_convex(image, drawn, value);
+    filler.fill(image, drawn, value);
   }
 }
 

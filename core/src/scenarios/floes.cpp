@@ -6,12 +6,10 @@
 #include <limits>
 #include <vector>
 
-#include "../local_geometry.hpp"
+#include "pushplan/geometry/polygon.hpp"
 
 namespace pushplan {
 namespace {
-
-using local::polygon_area;
 
 constexpr int kBisections = 24;
 constexpr double kShortestEdge = 0.08;  // edge that is left out, in roots of the target area

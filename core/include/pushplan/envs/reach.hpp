@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "pushplan/geometry/pose.hpp"
+#include "pushplan/geometry/obstacles.hpp"
 
 namespace pushplan {
 
@@ -13,12 +13,6 @@ struct ReachShapes {
   Polygons robot;  // convex parts
   Polygons objects;
   std::span<const double> radii;  // (K,) circumscribed radii of the objects
-};
-
-/// Static obstacles: convex cores, and how far each obstacle reaches beyond its core [m].
-struct GrownCores {
-  Polygons cores;
-  std::span<const double> radii;
 };
 
 /// How a robot drives from where it is.
@@ -50,7 +44,7 @@ class Reach {
   /// fastest point of the robot has gone that far.
   double clear_time(const Pose& robot, const ArcMotion& motion, double limit,
                     double margin,  // distance that counts as contact [m]
-                    std::span<const Pose> objects, const GrownCores& obstacles);
+                    std::span<const Pose> objects, const Obstacles& obstacles);
 
   /// Marks the objects that were left out although something that moved came to overlap them.
   void struck(std::span<const bool> loaded,   // (K,) which objects were simulated

@@ -8,9 +8,9 @@
 #include <limits>
 #include <vector>
 
+#include "pushplan/arithmetic.hpp"
 #include "pushplan/array.hpp"
 #include "pushplan/geometry/pose.hpp"
-#include "pushplan/rounding.hpp"
 
 namespace pushplan {
 

@@ -4,14 +4,14 @@
 #include <cmath>
 #include <limits>
 
+#include "pushplan/arithmetic.hpp"
+
 namespace pushplan {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-Index ceil_index(double value) { return static_cast<Index>(std::ceil(value)); }
-Index floor_index(double value) { return static_cast<Index>(std::floor(value)); }
 
 CellSpan rows_of(Polygon outline) {
   CellSpan rows{outline[0].x, outline[0].x};

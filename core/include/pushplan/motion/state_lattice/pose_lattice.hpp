@@ -32,7 +32,7 @@ struct SwathRun {
 };
 
 /// A half plane in which the robot's origin stays: a u + b v <= c [steps].
-struct HalfPlane {
+struct OriginLimit {
   double a;
   double b;
   double c;
@@ -49,8 +49,8 @@ inline double swath_sum(std::span<const double> sums, std::span<const SwathRun> 
 }
 
 /// True if a path with its origin in `box` around (u, v) keeps to all half planes.
-inline bool within(std::span<const HalfPlane> planes, Index u, Index v, const OriginBox& box) {
-  for (const HalfPlane& plane : planes) {
+inline bool within(std::span<const OriginLimit> planes, Index u, Index v, const OriginBox& box) {
+  for (const OriginLimit& plane : planes) {
     double worst = plane.a * (static_cast<double>(u) + (plane.a > 0.0 ? box.row_max : box.row_min));
     worst += plane.b * (static_cast<double>(v) + (plane.b > 0.0 ? box.column_max : box.column_min));
     if (worst > plane.c) return false;
@@ -87,7 +87,7 @@ struct PoseLattice {
   std::span<const double> blocked_sums;  // the same for cells that must not be covered; empty where
                                          // there are none
   Index stride;                          // map rows + 1
-  std::span<const HalfPlane> planes;
+  std::span<const OriginLimit> planes;
   LatticeGoal goal;
   ArrayView<const double, 2> row_bounds;   // (H, rows) length of the path from each row and heading
                                            // to the line [m]
