@@ -87,13 +87,21 @@ auto copied_rows(std::span<const T> values) {
   return nb::ndarray<nb::numpy, Number, nb::ndim<2>>(owned->data(), {values.size(), kColumns}, owner);
 }
 
+/// (N, K, 3) numbers as N rows of K poses.
+inline ArrayView<Pose, 2> pose_rows(const FloatsOut<3>& array) {
+  return {reinterpret_cast<Pose*>(array.data()),
+          {static_cast<Index>(array.shape(0)), static_cast<Index>(array.shape(1))}};
+}
+
 void bind_geometry(nb::module_& module);
 void bind_gtsp(nb::module_& module);
 void bind_interaction(nb::module_& module);
 void bind_envs(nb::module_& module);
 void bind_learned(nb::module_& module);
 void bind_motion(nb::module_& module);
+void bind_motion_paths(nb::module_& module);
 void bind_observation(nb::module_& module);
+void bind_planners(nb::module_& module);
 void bind_scenarios(nb::module_& module);
 void bind_search(nb::module_& module);
 

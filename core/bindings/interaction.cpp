@@ -1,6 +1,7 @@
 #include "arrays.hpp"
-#include "pushplan/interaction/ice.hpp"
-#include "pushplan/interaction/quasi_static.hpp"
+#include "pushplan/interaction/model.hpp"
+#include "pushplan/interaction/occupancy.hpp"
+#include "pushplan/interaction/path_sweep.hpp"
 
 namespace pushplan::bindings {
 
@@ -8,10 +9,61 @@ using namespace nb::literals;
 
 namespace {
 
-/// (N, K, 3) numbers as N rows of K poses.
-ArrayView<Pose, 2> pose_rows(const FloatsOut<3>& array) {
-  return {reinterpret_cast<Pose*>(array.data()),
-          {static_cast<Index>(array.shape(0)), static_cast<Index>(array.shape(1))}};
+using CoverageOut = Array<float, 2>;
+
+RasterFrame raster_frame(const OnePose& frame, double cell) { return {pose(frame), cell}; }
+
+template <InteractionModel M>
+void bind_step(nb::class_<M> model) {
+  model
+      .def(
+          "advance",
+          [](M& self, const OnePose& from, const OnePose& to, const PosesOut& objects,
+             const FloatsOut<1>& lengths) {
+            return self.advance(pose(from), pose(to), poses(objects), view(lengths));
+          },
+          "robot_from"_a.noconvert(), "robot_to"_a.noconvert(), "poses"_a.noconvert(),
+          "lengths"_a.noconvert(), ReleaseGil())
+      .def_prop_ro("tests", &M::tests);
+}
+
+void bind_portions(nb::module_& module) {
+  module.def(
+      "cover_objects",
+      [](const Poses& bodies, const Points& vertices, const Integers<1>& offsets,
+         const OnePose& frame, double cell, const CoverageOut& out) {
+        cover_objects(poses(bodies), {points(vertices), view(offsets)}, raster_frame(frame, cell),
+                      view(out));
+      },
+      "poses"_a.noconvert(), "vertices"_a.noconvert(), "offsets"_a.noconvert(),
+      "frame"_a.noconvert(), "cell"_a, "out"_a.noconvert(), ReleaseGil());
+  module.def(
+      "cover_sweep",
+      [](const Poses& path, const Points& vertices, const Integers<1>& offsets,
+         const OnePose& frame, double cell, const CoverageOut& out) {
+        cover_sweep(poses(path), {points(vertices), view(offsets)}, raster_frame(frame, cell),
+                    view(out));
+      },
+      "path"_a.noconvert(), "vertices"_a.noconvert(), "offsets"_a.noconvert(),
+      "frame"_a.noconvert(), "cell"_a, "out"_a.noconvert(), ReleaseGil());
+  module.def(
+      "step_works",
+      [](const FloatsOut<3>& swept, const Floats<1>& masses, const FloatsOut<1>& works) {
+        step_works(pose_rows(swept), view(masses), view(works));
+      },
+      "swept"_a.noconvert(), "masses"_a.noconvert(), "works"_a.noconvert(), ReleaseGil());
+  module.def(
+      "sweep_near",
+      [](const Poses& path, const PosesOut& floes, const IceBodies& bodies, double step,
+         Index iterations, double hull_friction, double friction, double still, double margin,
+         const FloatsOut<3>& out, const FloatsOut<1>& works) {
+        sweep_near(poses(path), poses(floes), bodies,
+                   {step, iterations, hull_friction, friction, still}, margin, pose_rows(out),
+                   view(works));
+      },
+      "path"_a.noconvert(), "poses"_a.noconvert(), "bodies"_a, "step"_a, "iterations"_a,
+      "hull_friction"_a, "friction"_a, "still"_a, "margin"_a, "out"_a.noconvert(),
+      "works"_a.noconvert(), ReleaseGil());
 }
 
 }  // namespace
@@ -109,6 +161,33 @@ void bind_interaction(nb::module_& module) {
             return self.sweep(poses(path), poses(floes), pose_rows(out));
           },
           "path"_a.noconvert(), "poses"_a.noconvert(), "out"_a.noconvert(), ReleaseGil());
+
+  bind_step<IceInteraction>(
+      nb::class_<IceInteraction>(module, "IceInteraction",
+                                 "Floes as a model that is driven step by step.")
+          .def(
+              "__init__",
+              [](IceInteraction* self, const IceBodies& bodies, double step, Index iterations,
+                 double hull_friction, double friction, double still) {
+                new (self) IceInteraction(bodies, {step, iterations, hull_friction, friction, still});
+              },
+              "bodies"_a, "step"_a, "iterations"_a, "hull_friction"_a, "friction"_a, "still"_a,
+              nb::keep_alive<1, 2>()));
+
+  bind_step<CalledInteraction>(
+      nb::class_<CalledInteraction>(module, "CalledInteraction", "Any model behind a C function.")
+          .def(
+              "__init__",
+              [](CalledInteraction* self, std::uintptr_t address, const Floats<1>& radii,
+                 const Floats<1>& inverse_masses) {
+                new (self) CalledInteraction(reinterpret_cast<CalledInteraction::Advance>(address),
+                                             nullptr, view(radii), view(inverse_masses));
+              },
+              "address"_a, "radii"_a.noconvert(), "inverse_masses"_a.noconvert(),
+              nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>(),
+              "The function at `address` is a `CalledInteraction::Advance` and outlives the model."));
+
+  bind_portions(module);
 }
 
 }  // namespace pushplan::bindings

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <span>
 
+#include "pushplan/arithmetic.hpp"
 #include "pushplan/array.hpp"
 
 namespace pushplan {
@@ -65,6 +66,11 @@ struct Polygons {
 inline double wrap_angle(double angle) {
   constexpr double kTurn = 2.0 * std::numbers::pi;
   return angle - kTurn * std::rint(angle / kTurn);
+}
+
+/// The equivalent angle in [-pi, pi); in its last bits it may differ from `wrap_angle`.
+inline double wrap_below_pi(double angle) {
+  return floor_mod(angle + std::numbers::pi, 2.0 * std::numbers::pi) - std::numbers::pi;
 }
 
 /// Carries points from the frame of a body to the world. `out` may be the points themselves.

@@ -58,6 +58,8 @@ class QuasiStatic {
   Index sweep(std::span<const Pose> path, std::span<Pose> poses, ArrayView<Pose, 2> out);
 
   const Bodies& bodies() const { return bodies_; }
+  std::span<const double> radii() const { return bodies_.radii; }
+  std::span<const double> inverse_masses() const { return bodies_.inverse_masses; }
   /// Pairs of outlines tested so far: a measure of time without a clock.
   Index tests() const { return tests_; }
   void reset_tests() { tests_ = 0; }
