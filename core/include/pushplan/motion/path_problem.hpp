@@ -1,0 +1,42 @@
+// What searches know of a problem, and of a path.
+#pragma once
+
+#include <span>
+
+#include "pushplan/motion/collision.hpp"
+#include "pushplan/motion/dubins.hpp"
+#include "pushplan/motion/goal_region.hpp"
+
+namespace pushplan {
+
+/// Costs and constraints of a path.
+struct PathProblem {
+  double robot_mass;      // m0 [kg]
+  double push_weight;     // w: weight of a unit of interaction work
+  double turning_radius;  // least one [m]
+  double spacing;         // greatest distance between two poses of a path [m]
+  double jam_length;      // added to a path's length at each pose where the robot jams [m], to tell
+                          // it from any other
+  double displacement;    // typical sideways displacement that shortcutting tries [m]
+  GoalRegion goal;
+  Footprint footprint;    // with its margin
+  ConvexObstacles walls;
+};
+
+/// A path with the K objects that it sweeps, in memory of somebody else that may be longer than the
+/// poses in use.
+struct SweptPath {
+  std::span<Pose> poses;         // (M,)
+  std::span<double> curvatures;  // (M,) of the arc that leads to each pose [1/m]
+  ArrayView<Pose, 2> objects;    // (M, K) where the objects are when the robot is at each pose
+  std::span<double> lengths;     // (M,) path length so far [m]
+  std::span<double> works;       // (M,) interaction work so far [kg m]
+
+  PathBuffer buffer() const { return {poses, curvatures}; }
+};
+
+/// Lays the poses of arcs into a path, up to the goal. Returns their number, 0 if there is no room.
+Index lay_out(const Pose& start, std::span<const Arc> arcs, const SweptPath& path,
+              const PathProblem& problem);
+
+}  // namespace pushplan

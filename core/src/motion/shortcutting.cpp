@@ -1,0 +1,107 @@
+#include "pushplan/motion/shortcutting.hpp"
+
+#include <cmath>
+
+#include "pushplan/motion/shortcut.hpp"
+
+namespace pushplan {
+namespace {
+
+constexpr double kToEnd = 0.2;       // share of candidates with another end,
+constexpr double kThrough = 0.65;    // and of these with those that lead through another pose
+constexpr double kInside = 0.999;    // distance of an end from the centre of a goal [radii]
+constexpr double kMostShift = 0.5;   // greatest change of an end's heading for the turn to it [rad]
+
+double sign(double x) { return x > 0.0 ? 1.0 : (x < 0.0 ? -1.0 : 0.0); }
+
+std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+
+/// A pose in the goal near `last` that a robot at `from` would drive straight into.
+Pose new_end(const Pose& from, const Pose& last, const ShortcutShift& shift,
+             const PathProblem& problem) {
+  const GoalRegion& goal = problem.goal;
+  Pose end;
+  if (goal.kind == GoalRegion::Kind::kDisc) {
+    const double angle =
+        std::atan2(last.y - goal.point.y, last.x - goal.point.x) + 0.6 * shift.sideways;
+    end.x = goal.point.x + kInside * goal.radius * std::cos(angle);
+    end.y = goal.point.y + kInside * goal.radius * std::sin(angle);
+  } else {
+    double behind =
+        (last.x - goal.point.x) * goal.normal.x + (last.y - goal.point.y) * goal.normal.y;
+    behind -= 1e-5 * problem.spacing;
+    const double aside = problem.displacement * shift.sideways;
+    end.x = last.x - behind * goal.normal.x - aside * goal.normal.y;
+    end.y = last.y - behind * goal.normal.y + aside * goal.normal.x;
+  }
+  // heading at the end of the turn-then-straight path: nearly the bearing from here
+  end.theta = std::atan2(end.y - from.y, end.x - from.x) + 0.1 * shift.turn;
+  const double turn = wrap_below_pi(end.theta - from.theta);
+  const double dx = end.x - from.x;
+  const double dy = end.y - from.y;
+  const double gap = std::sqrt(dx * dx + dy * dy);
+  // a turn before the straight shifts the bearing by about r (1 - cos turn) / gap
+  const double shifted =
+      problem.turning_radius * (1.0 - std::cos(turn)) / std::max(gap, problem.turning_radius);
+  end.theta += sign(turn) * std::min(shifted, kMostShift);
+  return end;
+}
+
+/// First and last pose of the piece to replace: short pieces as often as long ones.
+struct Piece {
+  Index first;
+  Index last;
+};
+
+Piece pick_piece(Index count, const ShortcutDraw& draw) {
+  const auto span =
+      static_cast<Index>(2.0 + static_cast<double>(count - 2) * draw.span * draw.span);
+  const auto first = static_cast<Index>(draw.place * static_cast<double>(count - span));
+  return {first, std::min(first + span, count - 1)};
+}
+
+}  // namespace
+
+ShortcutProposal propose_shortcut(const SweptPath& path, Index count, const ShortcutDraw& draw,
+                                  const ShortcutShift& shift, const PathProblem& problem,
+                                  const SweptPath& trial) {
+  const bool to_end = draw.kind < kToEnd;
+  auto [first, last] = pick_piece(count, draw);
+  if (to_end) {
+    const Index span = last - first;
+    last = count - 1;
+    first = std::max(Index{0}, last - span);
+  }
+  const ShortcutProposal none{first, 0, 0};
+  Pose target = path.poses[at(last)];
+  if (to_end) target = new_end(path.poses[at(first)], path.poses[at(count - 1)], shift, problem);
+  const Path old{path.poses.first(at(count)), path.curvatures.first(at(count))};
+  const PathBuffer out = trial.buffer();
+  Index size = copy_start(old, first, out);
+  const auto drive_to = [&](const Pose& stop) {
+    const Pose here = out.poses[at(size - 1)];
+    const DubinsPath way = dubins(here, stop, problem.turning_radius);
+    const Index added = sample_arcs(here, way.arcs, problem.spacing, out.from(size));
+    if (added >= 0) size += added;
+    return added >= 0;
+  };
+  if (!to_end && draw.kind < kThrough && last - first > 3) {
+    // displacements of all sizes, from fine adjustments to another side of a box
+    const double scale = std::pow(10.0, -1.5 * draw.scale);
+    const double sideways = problem.displacement * shift.sideways * scale;
+    const double turn = 0.3 * shift.turn * scale;
+    if (!drive_to(displace(path.poses[at((first + last) / 2)], sideways, turn))) return none;
+  }
+  if (!drive_to(target)) return none;
+  const Index added = size - first - 1;
+  const Pose arrived = out.poses[at(size - 1)];
+  const double miss = std::abs(arrived.x - target.x) + std::abs(arrived.y - target.y);
+  if (miss > 1e-3 * problem.spacing) return none;
+  if (to_end && !problem.goal.contains({arrived.x, arrived.y})) return none;
+  const Index rest = count - 1 - last;
+  if (to_end || rest == 0) return {first, added, size};
+  if (size + rest > out.size()) return none;
+  return {first, added, copy_rest(old, last, out, size)};
+}
+
+}  // namespace pushplan
