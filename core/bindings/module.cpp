@@ -14,8 +14,11 @@ NB_MODULE(_core, module) {
   pushplan::bindings::bind_learned(learned);
   auto motion = module.def_submodule("motion", "Arcs, shortcuts and state lattices.");
   pushplan::bindings::bind_motion(motion);
+  pushplan::bindings::bind_motion_paths(motion);
   auto observation = module.def_submodule("observation", "Worlds drawn into images.");
   pushplan::bindings::bind_observation(observation);
+  auto planners = module.def_submodule("planners", "Searches and tables of planners.");
+  pushplan::bindings::bind_planners(planners);
   auto scenarios = module.def_submodule("scenarios", "Steps of the ice generator.");
   pushplan::bindings::bind_scenarios(scenarios);
   auto search = module.def_submodule("search", "Shortest paths on graphs.");

@@ -1,0 +1,151 @@
+#include "pushplan/planners/push_aware/cost_to_go.hpp"
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "pushplan/arithmetic.hpp"
+#include "pushplan/search/grid_dijkstra.hpp"
+#include "pushplan/zeroed_array.hpp"
+
+namespace pushplan {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kTurn = 2.0 * std::numbers::pi;
+constexpr double kLeastWeight = 0.25;  // of the cells with a value, for an interpolated one
+constexpr double kSome = 1e-9;         // weight from which a cell counts
+constexpr double kLargest = 1e9;       // change of a value that was infinite [m]
+
+/// Two neighbouring headings of a table.
+struct HeadingPair {
+  std::array<Index, 2> index;
+  std::array<double, 2> weight;
+};
+
+HeadingPair headings_around(double theta, Index headings) {
+  const auto count = static_cast<double>(headings);
+  const double place = floor_mod(theta / kTurn * count, count);
+  const auto whole = static_cast<Index>(place);
+  const double part = place - static_cast<double>(whole);
+  const Index first = floor_mod(whole, headings);
+  return {{first, floor_mod(first + 1, headings)}, {1.0 - part, part}};
+}
+
+/// Interpolates between cells; those without a value do not count, and it is infinite if too few have
+/// one.
+double interpolate(ArrayView<const double, 3> values, const Cells& cells, Vec2 p,
+                   const HeadingPair& heading) {
+  const double u = (p.x - cells.origin.x) / cells.step - 0.5;
+  const double v = (p.y - cells.origin.y) / cells.step - 0.5;
+  const Index column = floor_index(u);
+  const Index row = floor_index(v);
+  const double across = u - static_cast<double>(column);
+  const double down = v - static_cast<double>(row);
+  double total = 0.0;
+  double weight = 0.0;
+  for (Index di = 0; di < 2; ++di) {
+    const Index r = row + di;
+    if (r < 0 || r >= values.extent(0)) continue;
+    const double of_row = di == 1 ? down : 1.0 - down;
+    for (Index dj = 0; dj < 2; ++dj) {
+      const Index c = column + dj;
+      if (c < 0 || c >= values.extent(1)) continue;
+      const double of_cell = of_row * (dj == 1 ? across : 1.0 - across);
+      const double* here = &values(r, c, Index{0});
+      for (std::size_t k = 0; k < 2; ++k) {
+        const double w = of_cell * heading.weight[k];
+        const double value = here[heading.index[k]];
+        if (w > kSome && value < kInfinity) {
+          total += w * value;
+          weight += w;
+        }
+      }
+    }
+  }
+  return weight > kLeastWeight ? total / weight : kInfinity;
+}
+
+}  // namespace
+
+Index CostToGo::heading_of(double theta) const {
+  const auto count = static_cast<double>(headings());
+  return floor_mod(floor_index(theta / kTurn * count + 0.5), headings());
+}
+
+double CostToGo::length_to_go(const Pose& pose) const {
+  const double value = interpolate(values, cells, {pose.x, pose.y},
+                                   headings_around(pose.theta, headings()));
+  return value == kInfinity ? floor(row_of(pose.y), column_of(pose.x)) : value;
+}
+
+void mark_free(ArrayView<bool, 3> free, Index first, Index last, const Cells& cells,
+               const Footprint& footprint, const ConvexObstacles& walls) {
+  CollisionChecker checker(footprint, walls);
+  const Index columns = free.extent(1);
+  const Index headings = free.extent(2);
+  for (Index at = first; at < last; ++at) {
+    const Index r = at / columns;
+    const Index c = at % columns;
+    const Vec2 centre = cells.centre(r, c);
+    for (Index k = 0; k < headings; ++k) {
+      const double theta = kTurn * static_cast<double>(k) / static_cast<double>(headings);
+      free(r, c, k) = checker.is_free({centre.x, centre.y, theta});
+    }
+  }
+}
+
+Flood flood(ArrayView<const bool, 2> open, const Cells& cells, const GoalRegion& goal,
+            Index centre) {
+  const Index columns = open.extent(1);
+  std::vector<Index> starts;
+  std::vector<double> weights(static_cast<std::size_t>(open.size()), kInfinity);
+  for (Index at = 0; at < open.size(); ++at) {
+    const bool is_open = open.data()[at];
+    if (is_open) weights[static_cast<std::size_t>(at)] = 1.0;
+    const bool in_goal = is_open && goal.contains(cells.centre(at / columns, at % columns));
+    if (in_goal || at == centre) starts.push_back(at);
+  }
+  const ZeroedArray<bool> no_goals(open.size());
+  GridDijkstra search({weights.data(), open.shape()}, cells.step, starts);
+  search.settle({no_goals.data(), open.shape()}, open.size());
+  const auto costs = search.costs();
+  return {{costs.data(), costs.data() + costs.size()}, {search.order().begin(), search.order().end()}};
+}
+
+double sweep_cost_to_go(ArrayView<double, 3> values, const CostToGo& table,
+                        ArrayView<const bool, 3> free, std::span<const Index> order,
+                        const ArcEnds& arcs) {
+  const Index columns = table.columns();
+  const Index headings = table.headings();
+  const Index count = arcs.ends.extent(1);
+  std::vector<HeadingPair> end_headings;
+  for (Index i = 0; i < arcs.ends.size(); ++i) {
+    end_headings.push_back(headings_around(arcs.ends.data()[i].theta, headings));
+  }
+  double change = 0.0;
+  for (const Index at : order) {
+    const Index r = at / columns;
+    const Index c = at % columns;
+    if (table.floor(r, c) == 0.0) continue;
+    const Vec2 centre = table.cells.centre(r, c);
+    for (Index k = 0; k < headings; ++k) {
+      if (!free(r, c, k)) continue;
+      double best = values(r, c, k);
+      for (Index a = 0; a < count; ++a) {
+        const Pose& end = arcs.ends(k, a);
+        const HeadingPair& heading = end_headings[static_cast<std::size_t>(k * count + a)];
+        const Vec2 place{centre.x + end.x, centre.y + end.y};
+        const double value = arcs.length + interpolate(values, table.cells, place, heading);
+        if (value < best) best = value;
+      }
+      if (best < values(r, c, k)) {
+        change = std::max(change, std::min(values(r, c, k), kLargest) - best);
+        values(r, c, k) = best;
+      }
+    }
+  }
+  return change;
+}
+
+}  // namespace pushplan
