@@ -67,11 +67,7 @@ ShortcutProposal propose_shortcut(const SweptPath& path, Index count, const Shor
                                   const SweptPath& trial) {
   const bool to_end = draw.kind < kToEnd;
   auto [first, last] = pick_piece(count, draw);
-  if (to_end) {
-    const Index span = last - first;
-    last = count - 1;
-    first = std::max(Index{0}, last - span);
-  }
+  if (to_end) last = count - 1;
   const ShortcutProposal none{first, 0, 0};
   Pose target = path.poses[at(last)];
   if (to_end) target = new_end(path.poses[at(first)], path.poses[at(count - 1)], shift, problem);
