@@ -256,7 +256,7 @@ void bind_visibility(nb::module_& module) {
       "values"_a.noconvert(), "ox"_a, "oy"_a, "step"_a, "x"_a, "y"_a);
 }
 
-void bind_search(nb::module_& module) {
+void bind_path_search(nb::module_& module) {
   nb::class_<ObstacleGrid>(module, "ObstacleGrid", "The obstacles that reach into each cell.")
       .def(nb::init<const Obstacles&, double>(), "obstacles"_a, "margin"_a, nb::keep_alive<1, 2>())
       .def_prop_ro("shape", [](const ObstacleGrid& s) { return std::tuple(s.rows(), s.columns()); })
@@ -350,7 +350,7 @@ void bind_geometry(nb::module_& module) {
   bind_shapes(module);
   bind_obstacles(module);
   bind_visibility(module);
-  bind_search(module);
+  bind_path_search(module);
   bind_shadows(module);
 }
 
