@@ -254,6 +254,14 @@ void bind_visibility(nb::module_& module) {
         return sample(view(values), {{ox, oy}, step}, {x, y});
       },
       "values"_a.noconvert(), "ox"_a, "oy"_a, "step"_a, "x"_a, "y"_a);
+  module.def(
+      "sample_points",
+      [](const Floats<2>& values, double ox, double oy, double step, const Points& at,
+         const FloatsOut<1>& out) {
+        sample(view(values), {{ox, oy}, step}, points(at), view(out));
+      },
+      "values"_a.noconvert(), "ox"_a, "oy"_a, "step"_a, "points"_a.noconvert(),
+      "out"_a.noconvert(), ReleaseGil());
 }
 
 void bind_path_search(nb::module_& module) {

@@ -1,4 +1,5 @@
 #include <nanobind/stl/pair.h>
+#include <nanobind/stl/tuple.h>
 
 #include "arrays.hpp"
 #include "goal.hpp"
@@ -225,6 +226,13 @@ void bind_lattice(nb::module_& module) {
             return count;
           },
           "node"_a, "nodes"_a.noconvert(), "costs"_a.noconvert(), "edges"_a.noconvert())
+      .def(
+          "place_of",
+          [](const PoseLattice& self, Index node) {
+            const auto [heading, row, column] = self.place_of(node);
+            return std::tuple(heading, row, column);
+          },
+          "node"_a, "Heading, row and column of a node.")
       .def("estimate", &PoseLattice::estimate, "node"_a)
       .def("is_goal", &PoseLattice::is_goal, "node"_a)
       .def("edge_cost", &PoseLattice::edge_cost, "row"_a, "column"_a, "primitive"_a)

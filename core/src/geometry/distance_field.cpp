@@ -67,4 +67,9 @@ double sample(ArrayView<const double, 2> values, const Cells& cells, Vec2 p) {
   return own < kInfinity ? own : low;
 }
 
+void sample(ArrayView<const double, 2> values, const Cells& cells, std::span<const Vec2> points,
+            std::span<double> out) {
+  for (std::size_t n = 0; n < points.size(); ++n) out[n] = sample(values, cells, points[n]);
+}
+
 }  // namespace pushplan

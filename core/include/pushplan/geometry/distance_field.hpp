@@ -39,5 +39,8 @@ void fill_distances(ArrayView<double, 2> out, const Cells& cells, const Nodes& n
 /// around the point differ by more, or one is not finite, a wall lies between them and the cell that
 /// holds the point counts alone, or if it has no value the least of the others.
 double sample(ArrayView<const double, 2> values, const Cells& cells, Vec2 p);
+/// Reads it at many points.
+void sample(ArrayView<const double, 2> values, const Cells& cells, std::span<const Vec2> points,
+            std::span<double> out);
 
 }  // namespace pushplan

@@ -1,6 +1,7 @@
 #include "pushplan/planners/ship_predictive/ice_cost_to_go.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -66,9 +67,12 @@ void IceCostToGo::fill_field(const FloeMasses& floes) const {
 }
 
 double IceCostToGo::mass_ahead(const Pose& ship) const {
-  const double x = ship.x + bow * std::cos(ship.theta);
-  const double y = ship.y + bow * std::sin(ship.theta);
-  return sample(field, (y - low) / cell, (x - left) / cell);
+  return mass_at({ship.x + bow * std::cos(ship.theta), ship.y + bow * std::sin(ship.theta)});
+}
+
+/// Mass ahead of a bow at a place.
+double IceCostToGo::mass_at(Vec2 place) const {
+  return sample(field, (place.y - low) / cell, (place.x - left) / cell);
 }
 
 void IceCostToGo::fill_table() const {
@@ -86,14 +90,18 @@ void IceCostToGo::fill_table() const {
       const double length = row / std::cos(off);
       const double turns = std::max(1.0, length / radius / spread);
       const double aside = row * std::tan(off) / column;
+      const double heading = 0.5 * std::numbers::pi + off;
+      const Vec2 to_bow{bow * std::cos(heading), bow * std::sin(heading)};
+      const auto turned = [&](double side) {
+        return std::min(std::max(static_cast<double>(h) + side * turns, 0.0), last_heading);
+      };
+      const std::array<double, 3> next{turned(-1.0), turned(0.0), turned(1.0)};
       for (Index c = 0; c < columns; ++c) {
         const double x = left + static_cast<double>(c) * column;
-        const double ahead = mass_ahead({x, y, 0.5 * std::numbers::pi + off});
+        const double ahead = mass_at({x + to_bow.x, y + to_bow.y});
         double best = std::numeric_limits<double>::infinity();
-        for (const double side : {-1.0, 0.0, 1.0}) {
-          const double heading =
-              std::min(std::max(static_cast<double>(h) + side * turns, 0.0), last_heading);
-          best = std::min(best, look_up(r + 1, static_cast<double>(c) - aside, heading));
+        for (const double at : next) {
+          best = std::min(best, look_up(r + 1, static_cast<double>(c) - aside, at));
         }
         table(r, c, h) = length * (mass + weight * ahead) + best;
       }

@@ -53,6 +53,7 @@ struct IceCostToGo {
   double goal() const { return low + static_cast<double>(table.extent(0) - 1) * row; }
 
  private:
+  double mass_at(Vec2 place) const;
   double look_up(Index r, double c, double h) const;
 };
 
