@@ -24,16 +24,54 @@ double median(std::span<const double> values) {
   return (sorted[half - 1] + sorted[half]) / 2.0;
 }
 
-/// Bilinear value of a field, that of its edge beyond it.
-double sample(ArrayView<const double, 2> field, double r, double c) {
-  r = std::min(std::max(r, 0.0), static_cast<double>(field.extent(0)) - 1.000001);
-  c = std::min(std::max(c, 0.0), static_cast<double>(field.extent(1)) - 1.000001);
-  const auto i = static_cast<Index>(r);
-  const auto j = static_cast<Index>(c);
-  const double u = r - static_cast<double>(i);
-  const double v = c - static_cast<double>(j);
-  const double top = (1.0 - v) * field(i, j) + v * field(i, j + 1);
-  return (1.0 - u) * top + u * ((1.0 - v) * field(i + 1, j) + v * field(i + 1, j + 1));
+/// A place in a grid: between a line of it and the next one.
+struct Between {
+  Index line;
+  double part;  // of the way to the next line
+};
+
+/// A place in a field of so many lines, on its edge if it lies beyond.
+Between place_in_field(double at, Index lines) {
+  const double inside = std::min(std::max(at, 0.0), static_cast<double>(lines) - 1.000001);
+  const auto line = static_cast<Index>(inside);
+  return {line, inside - static_cast<double>(line)};
+}
+
+/// A place in a table, which has to lie within it.
+Between place_in_table(double at, Index lines) {
+  const Index line = std::min(static_cast<Index>(at), lines - 2);
+  return {line, at - static_cast<double>(line)};
+}
+
+/// Bilinear value of a field.
+double sample(ArrayView<const double, 2> field, Between row, Between column) {
+  const double* near = &field(row.line, column.line);
+  const double* far = near + field.extent(1);
+  const double u = row.part;
+  const double v = column.part;
+  return (1.0 - u) * ((1.0 - v) * near[0] + v * near[1]) +
+         u * ((1.0 - v) * far[0] + v * far[1]);
+}
+
+/// A place among the columns of a table: its nearest one within it, and how far that is.
+struct TableColumn {
+  Between column;
+  double beside;  // [columns]
+};
+
+TableColumn column_of(double at, Index columns) {
+  const auto last = static_cast<double>(columns) - 1.0;
+  const double beside = std::max(std::max(0.0, -at), at - last);
+  return {place_in_table(std::min(std::max(at, 0.0), last), columns), beside};
+}
+
+/// Bilinear value in one row of a table.
+double look_up(ArrayView<const double, 2> layer, Between column, Between heading) {
+  const double* first = &layer(column.line, heading.line);
+  const double* second = first + layer.extent(1);
+  const double near = first[0] + heading.part * (first[1] - first[0]);
+  const double far = second[0] + heading.part * (second[1] - second[0]);
+  return near + column.part * (far - near);
 }
 
 }  // namespace
@@ -67,12 +105,10 @@ void IceCostToGo::fill_field(const FloeMasses& floes) const {
 }
 
 double IceCostToGo::mass_ahead(const Pose& ship) const {
-  return mass_at({ship.x + bow * std::cos(ship.theta), ship.y + bow * std::sin(ship.theta)});
-}
-
-/// Mass ahead of a bow at a place.
-double IceCostToGo::mass_at(Vec2 place) const {
-  return sample(field, (place.y - low) / cell, (place.x - left) / cell);
+  const double x = ship.x + bow * std::cos(ship.theta);
+  const double y = ship.y + bow * std::sin(ship.theta);
+  return sample(field, place_in_field((y - low) / cell, field.extent(0)),
+                place_in_field((x - left) / cell, field.extent(1)));
 }
 
 void IceCostToGo::fill_table() const {
@@ -85,45 +121,34 @@ void IceCostToGo::fill_table() const {
   std::fill_n(goal_row.data(), goal_row.size(), 0.0);
   for (Index r = rows - 2; r >= 0; --r) {
     const double y = low + static_cast<double>(r) * row;
+    const auto next_row = table.row(r + 1);
     for (Index h = 0; h < headings; ++h) {
       const double off = -kSteepest + static_cast<double>(h) * spread;
       const double length = row / std::cos(off);
       const double turns = std::max(1.0, length / radius / spread);
       const double aside = row * std::tan(off) / column;
+      const auto turned = [&](double side) {
+        const double at = static_cast<double>(h) + side * turns;
+        return place_in_table(std::min(std::max(at, 0.0), last_heading), headings);
+      };
+      const std::array<Between, 3> next_headings{turned(-1.0), turned(0.0), turned(1.0)};
       const double heading = 0.5 * std::numbers::pi + off;
       const Vec2 to_bow{bow * std::cos(heading), bow * std::sin(heading)};
-      const auto turned = [&](double side) {
-        return std::min(std::max(static_cast<double>(h) + side * turns, 0.0), last_heading);
-      };
-      const std::array<double, 3> next{turned(-1.0), turned(0.0), turned(1.0)};
+      const Between bow_row = place_in_field((y + to_bow.y - low) / cell, field.extent(0));
       for (Index c = 0; c < columns; ++c) {
         const double x = left + static_cast<double>(c) * column;
-        const double ahead = mass_at({x + to_bow.x, y + to_bow.y});
+        const double ahead = sample(
+            field, bow_row, place_in_field((x + to_bow.x - left) / cell, field.extent(1)));
+        const TableColumn next = column_of(static_cast<double>(c) - aside, columns);
+        const double outside = kOutside * mass * next.beside * column;
         double best = std::numeric_limits<double>::infinity();
-        for (const double at : next) {
-          best = std::min(best, look_up(r + 1, static_cast<double>(c) - aside, at));
+        for (const Between& next_heading : next_headings) {
+          best = std::min(best, look_up(next_row, next.column, next_heading) + outside);
         }
         table(r, c, h) = length * (mass + weight * ahead) + best;
       }
     }
   }
-}
-
-/// Bilinear value in one row of the table, with a cost of being beside it.
-double IceCostToGo::look_up(Index r, double c, double h) const {
-  const auto layer = table.row(r);
-  const Index columns = layer.extent(0);
-  const Index headings = layer.extent(1);
-  const auto last_column = static_cast<double>(columns) - 1.0;
-  const double beside = std::max(std::max(0.0, -c), c - last_column);
-  c = std::min(std::max(c, 0.0), last_column);
-  const Index j = std::min(static_cast<Index>(c), columns - 2);
-  const Index k = std::min(static_cast<Index>(h), headings - 2);
-  const double u = c - static_cast<double>(j);
-  const double v = h - static_cast<double>(k);
-  const double near = layer(j, k) + v * (layer(j, k + 1) - layer(j, k));
-  const double far = layer(j + 1, k) + v * (layer(j + 1, k + 1) - layer(j + 1, k));
-  return near + u * (far - near) + kOutside * mass * beside * column;
 }
 
 double IceCostToGo::cost_to_go(const Pose& ship) const {
@@ -140,8 +165,11 @@ double IceCostToGo::cost_to_go(const Pose& ship) const {
   const double before = std::max(0.0, -r) * row;  // the ship goes straight up to the first row
   r = std::min(std::max(r, 0.0), last_row);
   const Index i = std::min(static_cast<Index>(r), rows - 2);
-  const double a = look_up(i, c, h);
-  const double b = look_up(i + 1, c, h);
+  const auto [place, beside] = column_of(c, table.extent(1));
+  const Between heading = place_in_table(h, table.extent(2));
+  const double outside = kOutside * mass * beside * column;
+  const double a = look_up(table.row(i), place, heading) + outside;
+  const double b = look_up(table.row(i + 1), place, heading) + outside;
   return a + (r - static_cast<double>(i)) * (b - a) +
          mass * (before + kOutside * steep * bow);
 }

@@ -51,10 +51,6 @@ struct IceCostToGo {
   double cost_to_go(const Pose& ship) const;
   /// y of the goal line [m].
   double goal() const { return low + static_cast<double>(table.extent(0) - 1) * row; }
-
- private:
-  double mass_at(Vec2 place) const;
-  double look_up(Index r, double c, double h) const;
 };
 
 }  // namespace pushplan
