@@ -307,13 +307,6 @@ void bind_path_search(nb::module_& module) {
           "x"_a, "y"_a, "corners"_a, "scene"_a, "grid"_a, "sliver"_a, nb::keep_alive<1, 4>(),
           nb::keep_alive<1, 5>(), nb::keep_alive<1, 6>(), ReleaseGil())
       .def("run", &VisibilitySearch::run, "budget"_a, ReleaseGil())
-      .def(
-          "exit_leg",
-          [](VisibilitySearch& self, double x, double y) {
-            const GoalLeg leg = self.exit_leg({x, y});
-            return std::tuple(leg.length, leg.end.x, leg.end.y);
-          },
-          "x"_a, "y"_a)
       .def_prop_ro("end", &VisibilitySearch::end)
       .def_prop_ro("lines_tested", &VisibilitySearch::lines_tested)
       .def_prop_ro("parents", [](const VisibilitySearch& s) { return copied(s.parents()); }, kOwned);

@@ -54,9 +54,16 @@ void relax(const Arcs& arcs, std::span<double> distances, std::span<Index> paren
 }
 
 GoalLeg goal_leg(Vec2 p, const GoalScene& scene) {
-  return goal_leg(p, scene, [&](Vec2 from, Vec2 to) {
-    return line_of_sight(from, to, scene.obstacles, scene.gap);
-  });
+  GoalLeg best{kInfinity, p};
+  for (Index k = 0; k < scene.regions.count(); ++k) {
+    const Vec2 q = nearest_in_region(k, p, scene.regions);
+    const double length = std::hypot(q.x - p.x, q.y - p.y);
+    if (length < best.length && scene.box.contains(q, scene.gap) &&
+        line_of_sight(p, q, scene.obstacles, scene.gap)) {
+      best = {length, q};
+    }
+  }
+  return best;
 }
 
 NodeLeg node_leg(Vec2 p, double limit, Index hint, bool tangent_only, const Nodes& nodes,

@@ -37,10 +37,6 @@ Vec2 VisibilitySearch::place(Index node) const {
   return node == kStart ? start_ : corners_.points[at(node)];
 }
 
-GoalLeg VisibilitySearch::exit_leg(Vec2 p) {
-  return goal_leg(p, scene_, [&](Vec2 from, Vec2 to) { return sight_.sees(from, to, scene_.gap); });
-}
-
 /// Puts a way of getting to a node into the heap.
 void VisibilitySearch::offer(Index node, double length, double bound, Index before, double limit) {
   heap_.push_back({length + bound, entries_++, length, limit, node, before});
@@ -63,7 +59,7 @@ void VisibilitySearch::expand(Index node, double length, double low) {
   bool rest = false;
   if (low == -kInfinity) {
     high = straight + cell_;
-    const double leg = exit_leg(p).length;
+    const double leg = goal_leg(p, scene_).length;
     if (leg < kInfinity) offer(goal_node(), length + leg, 0.0, node);
     for (std::size_t j = corners_.owner.size(); j < corners_.points.size(); ++j) {
       const double dx = corners_.points[j].x - p.x;

@@ -74,10 +74,6 @@ struct GoalLeg {
   Vec2 end;
 };
 
-/// Finds that way among the obstacles of the scene, with another test of sight `sees(p, q)`.
-template <class Sees>
-GoalLeg goal_leg(Vec2 p, const GoalScene& scene, Sees&& sees);
-
 GoalLeg goal_leg(Vec2 p, const GoalScene& scene);
 
 /// The node to walk to.
@@ -93,18 +89,5 @@ NodeLeg node_leg(Vec2 p,
                  bool tangent_only,  // skip nodes that no shortest path can touch from a place off
                                      // the outlines
                  const Nodes& nodes, const Obstacles& obstacles, double gap);
-
-// ----------------------------------------------------------------------------
-
-template <class Sees>
-GoalLeg goal_leg(Vec2 p, const GoalScene& scene, Sees&& sees) {
-  GoalLeg best{std::numeric_limits<double>::infinity(), p};
-  for (Index k = 0; k < scene.regions.count(); ++k) {
-    const Vec2 q = nearest_in_region(k, p, scene.regions);
-    const double length = std::hypot(q.x - p.x, q.y - p.y);
-    if (length < best.length && scene.box.contains(q, scene.gap) && sees(p, q)) best = {length, q};
-  }
-  return best;
-}
 
 }  // namespace pushplan

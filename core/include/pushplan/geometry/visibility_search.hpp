@@ -46,9 +46,6 @@ class VisibilitySearch {
   /// Goes on for about `budget` corners looked at, or lines tested.
   Outcome run(Index budget);
 
-  /// The straight way to the nearest region that can be seen.
-  GoalLeg exit_leg(Vec2 p);
-
   /// The last node of the path found.
   Index end() const { return end_; }
   /// The node before each that has been reached, (V + E,).
