@@ -102,6 +102,7 @@ void bind_motion(nb::module_& module);
 void bind_motion_paths(nb::module_& module);
 void bind_observation(nb::module_& module);
 void bind_planners(nb::module_& module);
+void bind_rearrangement(nb::module_& module);
 void bind_scenarios(nb::module_& module);
 void bind_search(nb::module_& module);
 

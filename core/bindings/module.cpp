@@ -19,6 +19,8 @@ NB_MODULE(_core, module) {
   pushplan::bindings::bind_observation(observation);
   auto planners = module.def_submodule("planners", "Searches and tables of planners.");
   pushplan::bindings::bind_planners(planners);
+  auto rearrangement = module.def_submodule("rearrangement", "Parts of rearrangement planning.");
+  pushplan::bindings::bind_rearrangement(rearrangement);
   auto scenarios = module.def_submodule("scenarios", "Steps of the ice generator.");
   pushplan::bindings::bind_scenarios(scenarios);
   auto search = module.def_submodule("search", "Shortest paths on graphs.");
