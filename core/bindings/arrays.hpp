@@ -93,15 +93,17 @@ inline ArrayView<Pose, 2> pose_rows(const FloatsOut<3>& array) {
           {static_cast<Index>(array.shape(0)), static_cast<Index>(array.shape(1))}};
 }
 
+void bind_control(nb::module_& module);
+void bind_envs(nb::module_& module);
 void bind_geometry(nb::module_& module);
 void bind_gtsp(nb::module_& module);
 void bind_interaction(nb::module_& module);
-void bind_envs(nb::module_& module);
 void bind_learned(nb::module_& module);
 void bind_motion(nb::module_& module);
 void bind_motion_paths(nb::module_& module);
 void bind_observation(nb::module_& module);
 void bind_planners(nb::module_& module);
+void bind_pushing(nb::module_& module);
 void bind_rearrangement(nb::module_& module);
 void bind_scenarios(nb::module_& module);
 void bind_search(nb::module_& module);

@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "arrays.hpp"
 #include "pushplan/control/mpc/tracker.hpp"
 #include "pushplan/control/waiting.hpp"
@@ -14,9 +16,7 @@ bool written(const std::optional<mpc::Twist>& command, const FloatsOut<1>& out) 
   return !command;
 }
 
-}  // namespace
-
-void bind_control(nb::module_& module) {
+void bind_horizon(nb::module_& module) {
   nb::class_<mpc::CommandLimits>(module, "CommandLimits")
       .def(
           "__init__",
@@ -73,6 +73,9 @@ void bind_control(nb::module_& module) {
           },
           "v"_a, "w"_a, "held"_a, "ramps"_a, "out"_a.noconvert())
       .def("remember", &mpc::Horizon::remember, "time"_a, "over"_a);
+}
+
+void bind_path(nb::module_& module) {
   nb::class_<mpc::ReferencePath>(module, "ReferencePath")
       .def(
           "__init__",
@@ -81,7 +84,34 @@ void bind_control(nb::module_& module) {
             new (self) mpc::ReferencePath{poses(path), view(lengths), view(speeds)};
           },
           "poses"_a.noconvert(), "lengths"_a.noconvert(), "speeds"_a.noconvert(),
-          nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>());
+          nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>())
+      .def(
+          "locate",
+          [](const mpc::ReferencePath& self, double x, double y, double low, double high) {
+            const auto [along, index, fraction] = mpc::locate(self, {x, y}, low, high);
+            return nb::make_tuple(along, index, fraction);
+          },
+          "x"_a, "y"_a, "low"_a, "high"_a)
+      .def(
+          "errors",
+          [](const mpc::ReferencePath& self, double x, double y, double theta, Index index,
+             double fraction) {
+            const auto [offset, error, heading, curvature] =
+                mpc::errors(self, {x, y, theta}, {0.0, index, fraction});
+            return nb::make_tuple(offset, error, heading, curvature);
+          },
+          "x"_a, "y"_a, "theta"_a, "index"_a, "fraction"_a);
+  module.def(
+      "arc",
+      [](double x, double y, double theta, double v, double w, double dt, const FloatsOut<1>& out) {
+        const mpc::ArcMotion motion = mpc::arc({x, y, theta}, {v, w}, dt);
+        std::copy_n(reinterpret_cast<const double*>(&motion), sizeof(motion) / sizeof(double),
+                    out.data());
+      },
+      "x"_a, "y"_a, "theta"_a, "v"_a, "w"_a, "dt"_a, "out"_a.noconvert());
+}
+
+void bind_tracker(nb::module_& module) {
   nb::class_<mpc::Tuning>(module, "Tuning")
       .def(
           "__init__",
@@ -93,8 +123,23 @@ void bind_control(nb::module_& module) {
                                    smoothness,  terminal,       speed_weight};
           },
           "size"_a, "max_speed"_a, "max_turn_rate"_a, "max_acceleration"_a, "stops"_a,
-           "optimise_speed"_a, "heading_weight"_a, "turn_weight"_a, "smoothness"_a, "terminal"_a,
-           "speed_weight"_a);
+          "optimise_speed"_a, "heading_weight"_a, "turn_weight"_a, "smoothness"_a, "terminal"_a,
+          "speed_weight"_a);
+  nb::class_<mpc::TrackingAssembly>(module, "TrackingAssembly", "Puts up tracking problems.")
+      .def(nb::init<Index>(), "variables"_a)
+      .def(
+          "assemble",
+          [](mpc::TrackingAssembly& self, const mpc::ReferencePath& track,
+             const mpc::Tuning& tuning, const OnePose& at, double along, const Floats<1>& before,
+             const Floats<1>& steps, const FloatsOut<2>& nominal, const FloatsOut<2>& hessian,
+             const FloatsOut<1>& gradient) {
+            self.assemble(track, tuning, pose(at), along, {before.data()[0], before.data()[1]},
+                          view(steps), rows_as<mpc::Twist>(nominal), view(hessian),
+                          view(gradient));
+          },
+          "track"_a, "tuning"_a, "pose"_a.noconvert(), "along"_a, "before"_a.noconvert(),
+          "steps"_a.noconvert(), "nominal"_a.noconvert(), "hessian"_a.noconvert(),
+          "gradient"_a.noconvert(), ReleaseGil());
   nb::class_<mpc::Tracker>(module, "Tracker", "A predictive tracker of one robot.")
       .def(nb::init<const mpc::Horizon&, const mpc::Tuning&, double, double>(), "horizon"_a,
            "tuning"_a, "span"_a, "delay"_a, nb::keep_alive<1, 2>())
@@ -115,7 +160,19 @@ void bind_control(nb::module_& module) {
                 self.finish_step(track, pose(at), time, held, solved);
           },
           "track"_a, "pose"_a.noconvert(), "time"_a, "held"_a, "solved"_a, "out"_a.noconvert(),
-          ReleaseGil());
+          ReleaseGil())
+      .def_prop_ro("place", &mpc::Tracker::place)
+      .def_prop_ro(
+          "pose",
+          [](const mpc::Tracker& self) {
+            const Pose& at = self.pose();
+            const double numbers[]{at.x, at.y, at.theta};
+            return copied(std::span<const double>(numbers));
+          },
+          kOwned);
+}
+
+void bind_waiting(nb::module_& module) {
   module.def(
       "clear_steps",
       [](double step, double turn, Index first, Index most, const Footprint& shape,
@@ -125,6 +182,15 @@ void bind_control(nb::module_& module) {
       },
       "step"_a, "turn"_a, "first"_a, "most"_a, "shape"_a, "walls"_a, "at"_a.noconvert(),
       ReleaseGil());
+}
+
+}  // namespace
+
+void bind_control(nb::module_& module) {
+  bind_horizon(module);
+  bind_path(module);
+  bind_tracker(module);
+  bind_waiting(module);
 }
 
 }  // namespace pushplan::bindings

@@ -19,6 +19,12 @@ NB_MODULE(_core, module) {
   pushplan::bindings::bind_observation(observation);
   auto planners = module.def_submodule("planners", "Searches and tables of planners.");
   pushplan::bindings::bind_planners(planners);
+  auto control = module.def_submodule("control", "Predictive control along a path.");
+  pushplan::bindings::bind_control(control);
+  auto observation = module.def_submodule("observation", "Worlds drawn into images.");
+  pushplan::bindings::bind_observation(observation);
+  auto pushing = module.def_submodule("pushing", "Predictive pushing of one box along a path.");
+  pushplan::bindings::bind_pushing(pushing);
   auto rearrangement = module.def_submodule("rearrangement", "Parts of rearrangement planning.");
   pushplan::bindings::bind_rearrangement(rearrangement);
   auto scenarios = module.def_submodule("scenarios", "Steps of the ice generator.");

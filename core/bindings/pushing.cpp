@@ -1,0 +1,253 @@
+#include <nanobind/stl/pair.h>
+
+#include <algorithm>
+
+#include "arrays.hpp"
+#include "pushplan/planners/pushing/push_tracker.hpp"
+
+namespace pushplan::bindings {
+
+using namespace nb::literals;
+using namespace pushplan::pushing;
+
+namespace {
+
+/// A state as Python has it: robot pose, offset, angle, gap.
+using OneState = nb::ndarray<const double, nb::shape<6>, nb::c_contig, nb::device::cpu>;
+using States = nb::ndarray<double, nb::shape<-1, 6>, nb::c_contig, nb::device::cpu>;
+/// Motions of a box as Python has them, the number of the mode fifth.
+using Motions = nb::ndarray<double, nb::shape<-1, 6>, nb::c_contig, nb::device::cpu>;
+
+PushState state_of(const OneState& array) {
+  return *reinterpret_cast<const PushState*>(array.data());
+}
+
+auto copied_state(const PushState& state) {
+  const auto* numbers = reinterpret_cast<const double*>(&state);
+  return copied(std::span(numbers, sizeof(PushState) / sizeof(double)));
+}
+
+void write(const BoxMotion& motion, double* out) {
+  const double mode = static_cast<double>(motion.mode);
+  const double numbers[]{motion.normal,   motion.sideways, motion.turn,
+                         motion.pressure, mode,            motion.shear};
+  std::ranges::copy(numbers, out);
+}
+
+void bind_contact(nb::module_& module) {
+  nb::class_<BoxContact>(module, "BoxContact", "Bumper and pushed face.")
+      .def(
+          "__init__",
+          [](BoxContact* self, double front, double half, double curvature, double depth,
+             double low, double high, double spread, double friction) {
+            new (self) BoxContact{front, half, curvature, depth, low, high, spread, friction};
+          },
+          "front"_a, "half"_a, "curvature"_a, "depth"_a, "low"_a, "high"_a, "spread"_a,
+          "friction"_a)
+      .def(
+          "line",
+          [](const BoxContact& self, double offset) {
+            const auto [low, high] = self.line(offset);
+            return std::pair{low, high};
+          },
+          "offset"_a)
+      .def(
+          "standoff",
+          [](const BoxContact& self, double offset, double angle) {
+            const auto [x, touch] = self.standoff(offset, angle);
+            return std::pair{x, touch};
+          },
+          "offset"_a, "angle"_a)
+      .def(
+          "velocity",
+          [](const BoxContact& self, double offset, double angle, double c, double s, double v,
+             double w, double dt, const FloatsOut<1>& out) {
+            const auto [motion, x] = contact_velocity(self, offset, angle, c, s, {v, w}, dt);
+            write(motion, out.data());
+            return x;
+          },
+          "offset"_a, "angle"_a, "c"_a, "s"_a, "v"_a, "w"_a, "dt"_a, "out"_a.noconvert())
+      .def(
+          "linearise",
+          [](const BoxContact& self, double offset, double angle, double v, double w, double dt,
+             const Floats<1>& widths, const FloatsOut<2>& slopes) {
+            const double* width = widths.data();
+            const BoxSlopes found = linearise(self, offset, angle, {v, w}, dt,
+                                              {width[0], width[1], width[2], width[3]});
+            std::ranges::copy(found.offset, slopes.data());
+            std::ranges::copy(found.angle, slopes.data() + found.offset.size());
+          },
+          "offset"_a, "angle"_a, "v"_a, "w"_a, "dt"_a, "widths"_a.noconvert(),
+          "slopes"_a.noconvert())
+      .def(
+          "roll_out",
+          [](const BoxContact& self, const OneState& start, const Floats<2>& twists,
+             const Floats<1>& steps, const States& states, const Motions& motions) {
+            std::vector<BoxMotion> found(steps.shape(0));
+            roll_out(self, state_of(start), rows_as<const Twist>(twists), view(steps),
+                     rows_as<PushState>(states), found);
+            for (std::size_t k = 0; k < found.size(); ++k) write(found[k], motions.data() + 6 * k);
+          },
+          "start"_a.noconvert(), "twists"_a.noconvert(), "steps"_a.noconvert(),
+          "states"_a.noconvert(), "motions"_a.noconvert(), ReleaseGil())
+      .def(
+          "observe",
+          [](const BoxContact& self, double normal, const OnePose& robot, const OnePose& box,
+             const FloatsOut<1>& out) {
+            *reinterpret_cast<PushState*>(out.data()) =
+                observe(self, normal, pose(robot), pose(box));
+          },
+          "normal"_a, "robot"_a.noconvert(), "box"_a.noconvert(), "out"_a.noconvert())
+      .def(
+          "box_pose",
+          [](const BoxContact& self, const OneState& state, const FloatsOut<1>& out) {
+            *reinterpret_cast<Pose*>(out.data()) = box_pose(self, state_of(state));
+          },
+          "state"_a.noconvert(), "out"_a.noconvert());
+}
+
+void bind_clearance(nb::module_& module) {
+  nb::class_<Clearance>(module, "Clearance", "Distances of robot and box from static things.")
+      .def(
+          "__init__",
+          [](Clearance* self, const Points& vertices, const Integers<1>& offsets,
+             const Floats<1>& radii, double least, double slack) {
+            new (self) Clearance({points(vertices), view(offsets)}, view(radii), {least, slack});
+          },
+          "vertices"_a.noconvert(), "offsets"_a.noconvert(), "radii"_a.noconvert(), "least"_a,
+          "slack"_a, nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>())
+      .def(
+          "gaps",
+          [](Clearance& self, const BoxContact& contact, double normal, const OneState& state,
+             const Obstacles& obstacles) {
+            const auto [robot, box] = self.gaps(contact, normal, state_of(state), obstacles);
+            return std::pair{robot, box};
+          },
+          "contact"_a, "normal"_a, "state"_a.noconvert(), "obstacles"_a, ReleaseGil())
+      .def(
+          "free_fraction",
+          [](Clearance& self, const BoxContact& contact, double normal, const OneState& start,
+             double v, double w, double duration, const Obstacles& obstacles) {
+            return self.free_fraction(contact, normal, state_of(start), {v, w}, duration,
+                                      obstacles);
+          },
+          "contact"_a, "normal"_a, "start"_a.noconvert(), "v"_a, "w"_a, "duration"_a,
+          "obstacles"_a, ReleaseGil());
+}
+
+void bind_problem(nb::module_& module) {
+  nb::class_<PushWeights>(module, "PushWeights", "Costs and scales of the cost.")
+      .def(
+          "__init__",
+          [](PushWeights* self, double length, double max_speed, double half, double curvature,
+             double heading, double offset, double rim, double safe, double angle, double grip,
+             double turn, double speed, double smoothness, double terminal) {
+            new (self) PushWeights{length, max_speed, half,  curvature,  heading,
+                                   offset, rim,       safe,  angle,      grip,
+                                   turn,   speed,     smoothness, terminal};
+          },
+          "length"_a, "max_speed"_a, "half"_a, "curvature"_a, "heading"_a, "offset"_a, "rim"_a,
+          "safe"_a, "angle"_a, "grip"_a, "turn"_a, "speed"_a, "smoothness"_a, "terminal"_a);
+  nb::class_<PushingProblem>(module, "PushingProblem", "The pushing problem of one call.")
+      .def(
+          "__init__",
+          [](PushingProblem* self, const BoxContact& contact, const mpc::ReferencePath& track,
+             const PushWeights& weights, const OneState& start, double along,
+             const Floats<1>& last, const Floats<1>& units, const Floats<1>& steps,
+             const Integers<1>& groups) {
+            new (self) PushingProblem{contact,
+                                      track,
+                                      weights,
+                                      state_of(start),
+                                      along,
+                                      {last.data()[0], last.data()[1]},
+                                      {units.data()[0], units.data()[1]},
+                                      view(steps),
+                                      view(groups)};
+          },
+          "contact"_a, "track"_a, "weights"_a, "start"_a.noconvert(), "along"_a,
+          "last"_a.noconvert(), "units"_a.noconvert(), "steps"_a.noconvert(),
+          "groups"_a.noconvert(), nb::keep_alive<1, 3>(), nb::keep_alive<1, 9>(),
+          nb::keep_alive<1, 10>());
+  nb::class_<PushAssembly>(module, "PushAssembly", "Puts up pushing problems of one size.")
+      .def(nb::init<Index, Index>(), "steps"_a, "commands"_a)
+      .def(
+          "assemble",
+          [](PushAssembly& self, const PushingProblem& problem, const Floats<2>& nominal,
+             const FloatsOut<2>& hessian, const FloatsOut<1>& gradient) {
+            return self.assemble(problem, rows_as<const Twist>(nominal), view(hessian),
+                                 view(gradient));
+          },
+          "problem"_a, "nominal"_a.noconvert(), "hessian"_a.noconvert(), "gradient"_a.noconvert(),
+          ReleaseGil());
+}
+
+void bind_tracker(nb::module_& module) {
+  nb::class_<Faces>(module, "Faces", "The sides of a box on one bumper.")
+      .def(
+          "__init__",
+          [](Faces* self, const Floats<2>& scores, const Floats<2>& contacts,
+             const Floats<1>& normals, const Floats<1>& curvatures) {
+            new (self) Faces{rows_as<const FaceScore>(scores), rows_as<const BoxContact>(contacts),
+                             view(normals), view(curvatures)};
+          },
+          "scores"_a.noconvert(), "contacts"_a.noconvert(), "normals"_a.noconvert(),
+          "curvatures"_a.noconvert(), nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(),
+          nb::keep_alive<1, 4>(), nb::keep_alive<1, 5>());
+  nb::class_<PushTracker>(module, "PushTracker", "Pushes one box along one path.")
+      .def(
+          "__init__",
+          [](PushTracker* self, const mpc::Horizon& horizon, const PushWeights& weights,
+             const Faces& faces, const Clearance& clearance, const Integers<1>& groups,
+             double reach, double delay, double gain) {
+            new (self) PushTracker(horizon, {weights, view(groups), reach, delay, gain}, faces,
+                                   clearance);
+          },
+          "horizon"_a, "weights"_a, "faces"_a, "clearance"_a, "groups"_a.noconvert(), "reach"_a,
+          "delay"_a, "gain"_a, nb::keep_alive<1, 2>(), nb::keep_alive<1, 4>(),
+          nb::keep_alive<1, 5>(), nb::keep_alive<1, 6>())
+      .def("begin", &PushTracker::begin, "direction"_a)
+      .def(
+          "observe",
+          [](PushTracker& self, const mpc::ReferencePath& track, const OnePose& robot,
+             const OnePose& box, double time, double held) {
+            return self.observe(track, pose(robot), pose(box), time, held);
+          },
+          "track"_a, "robot"_a.noconvert(), "box"_a.noconvert(), "time"_a, "held"_a, ReleaseGil())
+      .def("assemble", &PushTracker::assemble, "track"_a, "held"_a, ReleaseGil())
+      .def(
+          "drive",
+          [](PushTracker& self, const Obstacles& obstacles, bool solved, double time, double held,
+             const FloatsOut<1>& out) {
+            *reinterpret_cast<Twist*>(out.data()) = self.drive(obstacles, solved, time, held);
+          },
+          "obstacles"_a, "solved"_a, "time"_a, "held"_a, "out"_a.noconvert(), ReleaseGil())
+      .def(
+          "send",
+          [](PushTracker& self, double v, double w, double time, double held,
+             const FloatsOut<1>& out) {
+            *reinterpret_cast<Twist*>(out.data()) = self.send({v, w}, time, held);
+          },
+          "v"_a, "w"_a, "time"_a, "held"_a, "out"_a.noconvert())
+      .def_prop_ro("face", &PushTracker::face)
+      .def_prop_ro("along", &PushTracker::along)
+      .def_prop_ro("lateral", &PushTracker::lateral)
+      .def_prop_ro("slowed", &PushTracker::slowed)
+      .def_prop_ro("value", &PushTracker::value)
+      .def_prop_ro(
+          "state", [](const PushTracker& self) { return copied_state(self.state()); }, kOwned)
+      .def_prop_ro(
+          "state_in_effect",
+          [](const PushTracker& self) { return copied_state(self.state_in_effect()); }, kOwned);
+}
+
+}  // namespace
+
+void bind_pushing(nb::module_& module) {
+  bind_contact(module);
+  bind_clearance(module);
+  bind_problem(module);
+  bind_tracker(module);
+}
+
+}  // namespace pushplan::bindings
