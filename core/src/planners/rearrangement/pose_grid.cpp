@@ -11,6 +11,7 @@ namespace pushplan::rearrangement {
 namespace {
 
 constexpr double kMaxStartTurn = 0.5;  // from a pose to the headings that are near it [rad]
+constexpr Index kBlock = 64;           // poses that are passed over at once where none is in an object
 
 template <class Value>
 std::array<double, kHeadingCount> for_each_move(Value value) {
@@ -43,6 +44,13 @@ struct Range {
 Range range(double low, double high, Index count) {
   return {std::max<Index>(0, static_cast<Index>(std::ceil(low))),
           std::min(count - 1, static_cast<Index>(std::floor(high)))};
+}
+
+/// True if one of `kBlock` depths is positive. Without branches, for vector instructions.
+bool any_positive(const float* depths) {
+  int found = 0;
+  for (Index i = 0; i < kBlock; ++i) found |= static_cast<int>(depths[i] > 0.0F);
+  return found != 0;
 }
 
 }  // namespace
@@ -177,14 +185,21 @@ void contact_depths(const PoseGrid& grid, const Footprint& footprint, std::span<
 
 void add_layers(ArrayView<const float, 4> layers, std::span<const double> weights,
                 ArrayView<double, 3> depth, ArrayView<double, 3> touch) {
+  double* depths = depth.data();
+  double* touched = touch.data();
   const Index size = depth.size();
   for (std::size_t k = 0; k < weights.size(); ++k) {
-    if (weights[k] == 0.0) continue;
+    const double weight = weights[k];
+    if (weight == 0.0) continue;
     const float* layer = layers.row(static_cast<Index>(k)).data();
-    for (Index n = 0; n < size; ++n) {
-      if (layer[n] > 0.0F) {
-        depth.data()[n] += static_cast<double>(layer[n]);
-        touch.data()[n] += weights[k];
+    for (Index begin = 0; begin < size; begin += kBlock) {
+      const Index end = std::min(begin + kBlock, size);
+      if (end - begin == kBlock && !any_positive(layer + begin)) continue;
+      for (Index n = begin; n < end; ++n) {
+        if (layer[n] > 0.0F) {
+          depths[n] += static_cast<double>(layer[n]);
+          touched[n] += weight;
+        }
       }
     }
   }
