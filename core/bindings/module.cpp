@@ -2,27 +2,26 @@
 
 NB_MODULE(_core, module) {
   module.doc() = "The compiled core of pushplan (C++, see core/). Arguments are not checked.";
+  // rooms whose types others take come first
   auto geometry = module.def_submodule("geometry", "Shapes, obstacles and distances around them.");
   pushplan::bindings::bind_geometry(geometry);
-  auto gtsp = module.def_submodule("gtsp", "Parts of the GTSP solver.");
-  pushplan::bindings::bind_gtsp(gtsp);
   auto interaction = module.def_submodule("interaction", "Models of what the robot pushes.");
   pushplan::bindings::bind_interaction(interaction);
-  auto envs = module.def_submodule("envs", "Parts of simulators.");
-  pushplan::bindings::bind_envs(envs);
-  auto learned = module.def_submodule("learned", "What learned policies observe.");
-  pushplan::bindings::bind_learned(learned);
   auto motion = module.def_submodule("motion", "Arcs, shortcuts and state lattices.");
   pushplan::bindings::bind_motion(motion);
   pushplan::bindings::bind_motion_paths(motion);
+  auto control = module.def_submodule("control", "Predictive control along a path.");
+  pushplan::bindings::bind_control(control);
+  auto envs = module.def_submodule("envs", "Parts of simulators.");
+  pushplan::bindings::bind_envs(envs);
+  auto gtsp = module.def_submodule("gtsp", "Parts of the GTSP solver.");
+  pushplan::bindings::bind_gtsp(gtsp);
+  auto learned = module.def_submodule("learned", "What learned policies observe.");
+  pushplan::bindings::bind_learned(learned);
   auto observation = module.def_submodule("observation", "Worlds drawn into images.");
   pushplan::bindings::bind_observation(observation);
   auto planners = module.def_submodule("planners", "Searches and tables of planners.");
   pushplan::bindings::bind_planners(planners);
-  auto control = module.def_submodule("control", "Predictive control along a path.");
-  pushplan::bindings::bind_control(control);
-  auto observation = module.def_submodule("observation", "Worlds drawn into images.");
-  pushplan::bindings::bind_observation(observation);
   auto pushing = module.def_submodule("pushing", "Predictive pushing of one box along a path.");
   pushplan::bindings::bind_pushing(pushing);
   auto rearrangement = module.def_submodule("rearrangement", "Parts of rearrangement planning.");
