@@ -2,14 +2,33 @@
 
 from __future__ import annotations
 
+import hashlib
+from pathlib import Path
+
 from pushplan.errors import PushplanError
 
 try:
-    from pushplan._core import gtsp
+    from pushplan._core import COMPILER, SOURCES, gtsp
 except ImportError as error:
     raise PushplanError(
         f"the compiled core of pushplan is not built for this tree ({error}): "
         f"run pip install -e . in it"
     ) from error
 
-__all__ = ["gtsp"]
+__all__ = ["COMPILER", "SOURCES", "gtsp", "is_stale"]
+
+
+def is_stale() -> bool:
+    """Return True if the sources beside the package are not those that the core was built from."""
+    top = Path(__file__).parents[1]
+    files = {
+        path.relative_to(top).as_posix(): path
+        for room in ("include", "src", "bindings")
+        for path in (top / "core" / room).rglob("*.[ch]pp")
+    }
+    if not files:  # an installed package comes without them
+        return False
+    listing = "".join(
+        f"{name} {hashlib.sha256(files[name].read_bytes()).hexdigest()}\n" for name in sorted(files)
+    )
+    return hashlib.sha256(listing.encode()).hexdigest()[:12] != SOURCES

@@ -28,7 +28,6 @@ from pushplan.gtsp import (
     TourStatus,
     read_gtsp,
     solve_gtsp,
-    warm_up_solver,
 )
 from pushplan.world import Deadline
 
@@ -167,7 +166,6 @@ def main() -> None:
     parser.add_argument("--budgets", type=float, nargs="+", default=[1.0, 10.0], help="families")
     parser.add_argument("--only", nargs="+", choices=PARTS, default=PARTS)
     options = parser.parse_args()
-    warm_up_solver()
     if options.cpu:
         time.perf_counter = time.process_time
     clock = "processor time" if options.cpu else "wall-clock time"

@@ -2,6 +2,8 @@
 
 NB_MODULE(_core, module) {
   module.doc() = "The compiled core of pushplan (C++, see core/). Arguments are not checked.";
+  module.attr("SOURCES") = PUSHPLAN_SOURCES;
+  module.attr("COMPILER") = PUSHPLAN_COMPILER;
   // rooms whose types others take come first
   auto geometry = module.def_submodule("geometry", "Shapes, obstacles and distances around them.");
   pushplan::bindings::bind_geometry(geometry);

@@ -7,6 +7,7 @@ requirement, and scripts in the temporary folder call it by the names that CMake
 from __future__ import annotations
 
 import os
+import platform
 import shutil
 import stat
 import sys
@@ -17,7 +18,7 @@ from typing import Any
 from scikit_build_core import build as _build
 
 _COMPILERS = ("c++", "g++", "clang++")
-_TARGET = "x86_64-linux-gnu.2.28"
+_TARGET = f"{platform.machine()}-linux-gnu.2.28"  # the oldest C library of the dependencies' wheels
 _TOOLS = {"CXX": "c++", "AR": "ar", "RANLIB": "ranlib"}
 
 
@@ -41,7 +42,7 @@ def _use_zig() -> None:
     folder = Path(tempfile.mkdtemp(prefix="pushplan-zig-"))
     for variable, tool in _TOOLS.items():
         script = folder / tool
-        options = f' -target {_TARGET.replace("x86_64", os.uname().machine)}' if tool == "c++" else ""
+        options = f" -target {_TARGET}" if tool == "c++" else ""
         script.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m ziglang {tool}{options} "$@"\n')
         script.chmod(script.stat().st_mode | stat.S_IXUSR)
         os.environ[variable] = str(script)

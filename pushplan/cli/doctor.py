@@ -13,6 +13,7 @@ from typing import Any
 
 from pushplan import __version__
 from pushplan.cli.common import has_screen, say, say_json
+from pushplan.errors import PushplanError
 from pushplan.imports.on_demand import EXTRAS
 
 BASE = ("numba", "numpy", "ompl", "yaml", "ruckig", "scipy", "shapely")
@@ -30,7 +31,7 @@ def run(options: argparse.Namespace) -> int:
         _tell(found)
     # without ruckig a limit of jerk is left out, and nothing else
     needed = [found["libraries"][name] for name in BASE if name != "ruckig"]
-    return 1 if None in needed else 0
+    return 1 if None in needed or found["core"]["problem"] else 0
 
 
 def examine() -> dict[str, Any]:
@@ -54,6 +55,7 @@ def examine() -> dict[str, Any]:
             }
             for extra, lost in missing.items()
         },
+        "core": _core(),
         "kernels": _kernels() if libraries["numba"] is not None else None,
         "drawing": {
             **{name: ctypes.util.find_library(name) is not None for name in _DISPLAYS},
@@ -71,6 +73,18 @@ def _version(module: str, owners: Any) -> str | None:
         return version(owners.get(module, [module])[0])
     except PackageNotFoundError:
         return "unknown"
+
+
+def _core() -> dict[str, Any]:
+    """Compiler and sources of the compiled core, and what is wrong with it."""
+    try:
+        from pushplan import core
+    except PushplanError as error:
+        return {"compiler": None, "sources": None, "problem": str(error)}
+    problem = None
+    if core.is_stale():
+        problem = "core/ has changed since the compiled core was built: run pip install -e . again"
+    return {"compiler": core.COMPILER, "sources": core.SOURCES, "problem": problem}
 
 
 def _kernels() -> dict[str, Any]:
@@ -103,6 +117,8 @@ def _tell(found: dict[str, Any]) -> None:
             say(f"{extra}: missing {', '.join(one['missing'])}; type: {one['install']}")
         else:
             say(f"{extra}: {said(name for name in EXTRAS if EXTRAS[name] == extra)}")
+    core = found["core"]
+    say(f"core: {core['problem'] or 'built by ' + core['compiler']}")
     if (kernels := found["kernels"]) is not None:
         _tell_kernels(kernels)
     drawing = found["drawing"]

@@ -5,19 +5,16 @@ from __future__ import annotations
 import argparse
 
 from pushplan.cli.common import milliseconds, say
-from pushplan.cli.kernel_progress import kernel_progress
 from pushplan.cli.output_files import check_file
 
 
 def run(options: argparse.Namespace) -> int:
     """Read, solve, say what was found; 1 if there is no tour."""
-    from pushplan.gtsp import GtspConfig, read_gtsp, solve_gtsp, warm_up_solver, write_tour
+    from pushplan.gtsp import GtspConfig, read_gtsp, solve_gtsp, write_tour
     from pushplan.world import Deadline, MaxIterations, Stop, stream
 
     check_file(options.out)
     instance = read_gtsp(options.file)
-    with kernel_progress():
-        warm_up_solver()
     if options.iterations:
         stop: Stop = MaxIterations(options.iterations)
     else:

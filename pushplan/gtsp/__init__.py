@@ -4,7 +4,7 @@ from pushplan.gtsp.gtsp_config import GtspConfig
 from pushplan.gtsp.gtsplib import read_gtsp
 from pushplan.gtsp.gtsplib_write import read_tour, write_gtsp, write_tour
 from pushplan.gtsp.instance import GtspInstance
-from pushplan.gtsp.solve import solve_gtsp, warm_up_solver
+from pushplan.gtsp.solve import solve_gtsp
 from pushplan.gtsp.tour import Tour, TourStats, TourStatus
 
 __all__ = [
@@ -16,7 +16,6 @@ __all__ = [
     "read_gtsp",
     "read_tour",
     "solve_gtsp",
-    "warm_up_solver",
     "write_gtsp",
     "write_tour",
 ]

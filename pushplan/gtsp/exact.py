@@ -10,7 +10,6 @@ from pushplan.core import gtsp as core
 from pushplan.gtsp.problem import Padded, Problem
 from pushplan.world.checks import FloatArray, IntArray
 
-
 ARCS_PER_SECOND = 1.5e9
 """Number of arcs that the core looks at in a second, on a slow machine."""
 

@@ -1,4 +1,4 @@
-"""An instance as the kernels want it: nodes of a cluster side by side, useless ones left out."""
+"""An instance as the core wants it: nodes of a cluster side by side, useless ones left out."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pushplan.compiled import owned
 from pushplan.core import gtsp as core
 from pushplan.world.checks import FloatArray, IntArray
 
@@ -27,11 +26,11 @@ class Problem:
 
     @staticmethod
     def build(costs: NDArray[np.number], members: Sequence[IntArray]) -> Problem:
-        """Gather the members of each cluster; what is in order and writable is not copied."""
+        """Gather the members of each cluster; what is in order is not copied."""
         names = np.concatenate(members)
         offsets = np.concatenate(([0], np.cumsum([len(nodes) for nodes in members])))
         if len(names) == len(costs) and (names == np.arange(len(names))).all():
-            gathered = owned(costs.astype(np.float64, copy=False))
+            gathered = np.ascontiguousarray(costs, dtype=np.float64)
         else:
             gathered = costs[np.ix_(names, names)].astype(np.float64)
         return Problem(gathered, offsets.astype(np.int64), names.astype(np.int64))
@@ -104,7 +103,7 @@ class Problem:
         if self.symmetric:
             return self.finite
         wide = np.full_like(self.finite, self.finite[0, -1])
-        wide[:, : -core.SPARE] = self.finite[:, :-core.SPARE].T
+        wide[:, : -core.SPARE] = self.finite[:, : -core.SPARE].T
         return wide
 
     @cached_property

@@ -223,9 +223,8 @@ class AnytimeSearch:
         problem = self.problem
         tour = self.tour
         rng = np.random.default_rng(tour.random_state + self.budget.used)
-        tour.start(
-            np.append(problem.root, rng.permutation(np.delete(np.arange(problem.count), problem.root)))
-        )
+        others = np.delete(np.arange(problem.count), problem.root)
+        tour.start(np.append(problem.root, rng.permutation(others)))
         self._note_best()
 
 

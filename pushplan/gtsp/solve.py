@@ -20,7 +20,7 @@ from pushplan.gtsp.proof import prove
 from pushplan.gtsp.search import Budget, search
 from pushplan.gtsp.tour import Tour, TourStats, TourStatus
 from pushplan.world.checks import IntArray
-from pushplan.world.stop import MaxIterations, Stop, check_rules
+from pushplan.world.stop import Stop, check_rules
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -208,16 +208,3 @@ class _SolverCall:
     def _stats(self, best_s: float = math.nan) -> TourStats:
         budget = self.budget
         return TourStats(budget.elapsed, best_s, budget.used, self.method, self.detail)
-
-
-def warm_up_solver(proof: bool = True) -> None:
-    """Solve a small instance in every way, so that later calls find compiled kernels.
-
-    Args:
-        proof: also with a lower bound.
-    """
-    costs = np.random.default_rng(0).random((14, 14))
-    clusters = [range(2 * c, 2 * c + 2) for c in range(7)]
-    solve_gtsp(costs, clusters)
-    config = GtspConfig(method="search", lower_bound=proof)
-    solve_gtsp(costs, clusters, stop=MaxIterations(50), config=config)

@@ -13,50 +13,35 @@ import numpy as np
 import pytest
 
 from benchmarks.accuracy.gtsp_instances import FAMILIES, instance
-from pushplan.compiled.cache import KernelCache
 from pushplan.gtsp import (
     GtspConfig,
     Tour,
     TourStatus,
     solve_gtsp,
-    warm_up_solver,
 )
-from pushplan.gtsp.dominance_kernels import needed_nodes
-from pushplan.gtsp.layer_kernels import (
-    Layers,
-    build,
-    close_gap,
-    insertion_cost,
-    keep,
-    link_in,
-    make_layers,
-    undo,
-)
-from pushplan.gtsp.node_choice_kernels import SPARE, pull_values, push_values
+from pushplan.gtsp.problem import Problem
 from pushplan.gtsp.search import AnytimeSearch
-from pushplan.gtsp.segment_swap_kernels import improve_by_swaps
 from pushplan.world import Cancellation, Deadline, InvalidInputError, MaxIterations
 
 SEARCH = GtspConfig(method="search")
 PROOF = GtspConfig(method="search", lower_bound=True)
 
 
-@pytest.fixture(scope="module", autouse=True)
-def _compiled() -> None:
-    warm_up_solver()
-
-
 @pytest.mark.parametrize("method", ["auto", "search"])
-def test_nothing_is_compiled_after_the_warm_up(
-    method: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A deadline would run out meanwhile: read-only costs, as of a file, are of another type."""
-    asked = []
-    monkeypatch.setattr(KernelCache, "load_overload", lambda self, *_: asked.append(self))
+def test_costs_may_have_any_layout_and_be_read_only(method: str) -> None:
     costs = np.random.default_rng(0).random((6, 6))
-    costs.flags.writeable = False
-    tour = solve_gtsp(costs, [[0], [1, 2], [3, 4, 5]], config=GtspConfig(method=method))
-    assert tour.status.has_tour and not asked
+    clusters = [[0], [1, 2], [3, 4, 5]]
+    config = GtspConfig(method=method)
+    tour = solve_gtsp(costs, clusters, config=config)
+    read_only = costs.copy()
+    read_only.flags.writeable = False
+    sparse = np.full((12, 12), np.nan)
+    sparse[::2, ::2] = costs
+    for other in (read_only, np.asfortranarray(costs), sparse[::2, ::2]):
+        before = other.copy()
+        again = solve_gtsp(other, clusters, config=config)
+        assert (again.nodes, again.cost) == (tour.nodes, tour.cost)
+        np.testing.assert_array_equal(other, before)
 
 
 def brute_force(costs: np.ndarray, clusters: list[list[int]]) -> float:
@@ -265,71 +250,6 @@ def test_search_and_proof_on_pushes_agree_with_dynamic_programming() -> None:
         assert tour.gap == 0.0
 
 
-def test_segment_swaps_keep_the_tour_and_count_what_they_save() -> None:
-    rng = np.random.default_rng(0)
-    for _ in range(200):
-        count, symmetric = int(rng.integers(3, 12)), bool(rng.integers(2))
-        costs = rng.random((count, count))
-        costs = costs + costs.T if symmetric else costs
-        order = rng.permutation(count)
-        nodes, before = order.copy(), costs[order, np.roll(order, -1)].sum()
-        near = np.argsort(costs + 9.0 * np.eye(count), axis=1)[:, : int(rng.integers(1, count))]
-        gain = improve_by_swaps(costs, np.ascontiguousarray(near), order, nodes, symmetric, 1e-12)
-        assert sorted(order) == list(range(count)) and (order == nodes).all()
-        assert costs[order, np.roll(order, -1)].sum() == pytest.approx(before - gain)
-
-
-def test_push_values_is_a_minimum_over_nodes() -> None:
-    rng = np.random.default_rng(0)
-    for _ in range(100):
-        n_at, n_to = (int(n) for n in rng.integers(1, 12, 2))
-        at, to = (int(n) for n in rng.integers(0, 9, 2))
-        costs = np.full((20, 20 + SPARE), np.nan)
-        costs[:, :20] = rng.normal(size=(20, 20))
-        values, out = rng.normal(size=(3, n_at)), np.empty(n_to + SPARE)
-        push_values(costs, values, 1, at, n_at, to, n_to, out)
-        expected = (values[1][:, None] + costs[at : at + n_at, to : to + n_to]).min(axis=0)
-        np.testing.assert_array_equal(out[:n_to], expected)
-        reverse = np.full_like(costs, np.nan)
-        reverse[:, :20] = costs[:, :20].T
-        pull_values(reverse, values, 1, at, n_at, to, n_to, out)
-        np.testing.assert_array_equal(out[:n_to], expected)
-
-
-def layers_of(costs: np.ndarray, offsets: np.ndarray) -> Layers:
-    """Memory for a tour on (N, N) costs."""
-    wide, reverse = np.zeros((2, len(costs), len(costs) + SPARE))
-    wide[:, : len(costs)], reverse[:, : len(costs)] = costs, costs.T
-    into = np.minimum.reduceat(costs, offsets[:-1], axis=0)
-    onto = np.ascontiguousarray(np.minimum.reduceat(costs, offsets[:-1], axis=1).T)
-    return make_layers(wide, reverse, into, onto, offsets, 0)
-
-
-def test_changes_of_a_tour_cost_what_building_it_anew_says() -> None:
-    """Clusters taken out and put back at random, then all of it undone."""
-    rng = np.random.default_rng(0)
-    for now in range(200):
-        offsets = np.concatenate(([0], np.cumsum([1, *rng.integers(1, 6, 8)])))
-        count = int(offsets[-1])
-        costs = rng.random((count, count))
-        order, memory = np.arange(9), layers_of(costs, offsets)
-        before = build(memory, order, 0)
-        cost, c = before, int(rng.integers(1, 9))
-        keep(memory, c, now)
-        cost += close_gap(memory, memory.before[c], memory.after[c], memory.carry[c], 0, now, 1e-12)
-        behind = int(rng.choice(np.delete(order, c)))
-        full = insertion_cost(memory, c, behind, memory.after[behind], np.inf)
-        limited = insertion_cost(memory, c, behind, memory.after[behind], 0.3)
-        assert limited == full or (limited == np.inf and full >= 0.3 - 1e-12)
-        cost += link_in(memory, c, behind, 0, now, 1e-12)
-        changed = np.delete(order, c)
-        changed = np.insert(changed, int(np.flatnonzero(changed == behind)[0]) + 1, c)
-        anew = layers_of(costs, offsets)
-        assert build(anew, changed, 0) == pytest.approx(cost)
-        undo(memory)
-        np.testing.assert_array_equal(memory.after, np.roll(order, -1))
-
-
 def test_nodes_that_are_left_out_are_those_that_another_one_can_stand_for() -> None:
     rng = np.random.default_rng(3)
     gone = 0
@@ -337,7 +257,7 @@ def test_nodes_that_are_left_out_are_those_that_another_one_can_stand_for() -> N
         offsets = np.concatenate(([0], np.cumsum(rng.integers(1, 6, 4))))
         owner = np.repeat(np.arange(4), np.diff(offsets))
         costs = rng.choice([0.0, 1.0, np.inf], (len(owner), len(owner)), p=[0.2, 0.7, 0.1])
-        needed = needed_nodes(costs, offsets)
+        needed = Problem(costs, offsets, np.arange(len(owner))).reduced().names
         gone += len(owner) - len(needed)
         for v in np.setdiff1d(np.arange(len(owner)), needed):
             rest = owner != owner[v]

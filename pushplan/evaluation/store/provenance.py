@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import pushplan
+from pushplan import core
 from pushplan.evaluation.store.rows import instant
 
 PACKAGES = (
@@ -26,12 +27,13 @@ _ENGINES = ("mujoco", "pymunk")
 _GIT_S = 5.0
 UNSEEN = frozenset(
     {
-        *("cli", "ros", "training", "evaluation/report", "evaluation/statistics"),
+        *("_core", "cli", "ros", "training", "evaluation/report", "evaluation/statistics"),
         *("evaluation/store/merging", "evaluation/store/rescoring", "evaluation/store/salvaging"),
         *("evaluation/store/status", "evaluation/run/reproduction"),
     }
 )
-"""Rooms and files of the package that no episode runs through. All others count."""
+"""Rooms and files of the package that no episode runs through, and the compiled core, which
+`versions` names by its sources. All others count."""
 
 
 def provenance(workers: int) -> dict[str, Any]:
@@ -103,14 +105,15 @@ def versions(simulator: str) -> dict[str, str]:
         simulator: name of the simulator; versions of other ones do not count.
 
     Returns:
-        ``python``, ``pushplan``, ``code`` (a hash of the package without `UNSEEN`) and installed
-        packages by name.
+        ``python``, ``pushplan``, ``code`` (a hash of the package without `UNSEEN`), ``core`` (a
+        hash of the sources of the compiled core, and its compiler) and installed packages by name.
     """
     others = {"torch", *_ENGINES} - {simulator}
     return {
         "python": platform.python_version(),
         "pushplan": pushplan.__version__,
         "code": package_digest(),
+        "core": f"{core.SOURCES} {core.COMPILER}",
         **{name: version for name, version in packages().items() if name not in others},
     }
 
@@ -123,7 +126,8 @@ def package_digest() -> str:
     for path in sorted(root.rglob("*")):
         where = path.relative_to(root)
         name = where.as_posix()
-        rooms = {where.parts[0], "/".join(where.parts[:2]), name.removesuffix(".py")}
+        first = where.parts[0]
+        rooms = {first.partition(".")[0], "/".join(where.parts[:2]), name.removesuffix(".py")}
         left_out = rooms & UNSEEN or path.suffix == ".md" or name.startswith(".")
         if path.is_file() and "__pycache__" not in where.parts and not left_out:
             digest.update(f"{name}\0".encode() + path.read_bytes() + b"\0")

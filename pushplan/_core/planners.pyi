@@ -1,0 +1,123 @@
+"""Searches and tables of planners."""
+
+from typing import Annotated, overload
+
+import numpy
+from numpy.typing import NDArray
+
+import _core.interaction
+import _core.motion
+
+
+class CostToGo:
+    """A table of lengths to the goal."""
+
+    def __init__(self, values: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], floor: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], x: float, y: float, cell: float) -> None: ...
+
+    def length_to_go(self, x: float, y: float, theta: float) -> float: ...
+
+    def sweep(self, values: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu')], free: Annotated[NDArray[numpy.bool_], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], order: Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C', device='cpu', writable=False)], ends: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], length: float) -> float:
+        """`values` are those of the table, to write to."""
+
+def mark_free(free: Annotated[NDArray[numpy.bool_], dict(shape=(None, None, None), order='C', device='cpu')], first: int, last: int, x: float, y: float, cell: float, footprint: _core.motion.Footprint, walls: _core.motion.ConvexObstacles) -> None: ...
+
+def flood(open: Annotated[NDArray[numpy.bool_], dict(shape=(None, None), order='C', device='cpu', writable=False)], x: float, y: float, cell: float, goal: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], centre: int, lengths: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu')]) -> Annotated[NDArray[numpy.int64], dict(shape=(None,))]: ...
+
+class PushTree:
+    """A search tree, in memory that is made once."""
+
+    def __init__(self, nodes: int, objects: int, memory: float, rows: int = 1, columns: int = 1, headings: int = 1, signatures: int = 1) -> None: ...
+
+    def set_cells(self, rows: int, columns: int, headings: int, signatures: int) -> None: ...
+
+    def plant(self, pose: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], objects: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu', writable=False)], estimate: float) -> None: ...
+
+    @property
+    def count(self) -> int: ...
+
+    @property
+    def full(self) -> bool: ...
+
+    @property
+    def driven(self) -> int: ...
+
+    def cost(self, node: int) -> float: ...
+
+    def arcs_to(self, node: int) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None))]: ...
+
+class PushSearch:
+    """A best-first search over arcs that push."""
+
+    def run(self, budget: int) -> int:
+        """0: no path exists; 1: the goal was reached; 2: paused."""
+
+    @property
+    def goal(self) -> int:
+        """The node of the tree in the goal, -1 before it is reached."""
+
+class RolloutProblem:
+    """Robot, static obstacles and goal."""
+
+    def __init__(self, period: float, substeps: int, limits: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], footprint: _core.motion.Footprint, walls: _core.motion.ConvexObstacles, goal: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], has_goal: bool, allowed: float) -> None: ...
+
+class Rollouts:
+    """Rollouts of poses among objects."""
+
+    def __init__(self, paths: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu')], twists: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu')], ends: Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C', device='cpu')], outcomes: Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C', device='cpu')], objects: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu')], works: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+
+def roll_robots(controls: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], start: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], speed: float, turn_rate: float, problem: RolloutProblem, out: Rollouts) -> None: ...
+
+@overload
+def push_search(tree: PushTree, table: CostToGo, curvatures: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], length: float, inflation: float, pruning_factor: float, masses: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], bound: float, problem: _core.motion.PathProblem, model: _core.interaction.QuasiStatic, size: int) -> PushSearch: ...
+
+@overload
+def push_search(tree: PushTree, table: CostToGo, curvatures: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], length: float, inflation: float, pruning_factor: float, masses: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], bound: float, problem: _core.motion.PathProblem, model: _core.interaction.IceInteraction, size: int) -> PushSearch: ...
+
+@overload
+def push_search(tree: PushTree, table: CostToGo, curvatures: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], length: float, inflation: float, pruning_factor: float, masses: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], bound: float, problem: _core.motion.PathProblem, model: _core.interaction.CalledInteraction, size: int) -> PushSearch:
+    """
+    A search from the root of a planted tree; `size` is twice the nodes of the tree.
+    """
+
+@overload
+def grow(tree: PushTree, draws: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], bound: float, longest: float, scales: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], problem: _core.motion.PathProblem, model: _core.interaction.QuasiStatic) -> int: ...
+
+@overload
+def grow(tree: PushTree, draws: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], bound: float, longest: float, scales: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], problem: _core.motion.PathProblem, model: _core.interaction.IceInteraction) -> int: ...
+
+@overload
+def grow(tree: PushTree, draws: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], bound: float, longest: float, scales: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], problem: _core.motion.PathProblem, model: _core.interaction.CalledInteraction) -> int:
+    """A node in the goal; -1: none; -2: memory is full."""
+
+@overload
+def roll_objects(model: _core.interaction.QuasiStatic, start: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu', writable=False)], rollouts: Rollouts) -> None: ...
+
+@overload
+def roll_objects(model: _core.interaction.IceInteraction, start: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu', writable=False)], rollouts: Rollouts) -> None: ...
+
+@overload
+def roll_objects(model: _core.interaction.CalledInteraction, start: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu', writable=False)], rollouts: Rollouts) -> None: ...
+
+def propose_change(poses: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu', writable=False)], curvatures: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], draws: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], normals: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], problem: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu')], out_curvatures: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> list[int]:
+    """
+    `problem` is radius, spacing, spread, most turn, end fraction, and the goal line.
+    """
+
+class IceCostToGo:
+    """Costs to the goal line if no floe moved."""
+
+    def __init__(self, table: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu')], field: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu')], left: float, low: float, column: float, row: float, cell: float, bow: float, mass: float, weight: float, radius: float) -> None: ...
+
+    def fill_field(self, poses: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu', writable=False)], radii: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], masses: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], half_beam: float) -> None: ...
+
+    def fill_table(self) -> None: ...
+
+    def mass_ahead(self, x: float, y: float, theta: float) -> float: ...
+
+    def cost_to_go(self, x: float, y: float, theta: float) -> float: ...
+
+    def cost_ahead(self, arc: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], step: float) -> tuple[float, float]: ...
+
+    def steer_on(self, pose: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], curvatures: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], step: float, out: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu')]) -> int: ...
+
+def arc_ahead(goal: float, low: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], high: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], pose: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], curvature: float, step: float, count: int) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None))]: ...
