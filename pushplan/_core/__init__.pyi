@@ -2,7 +2,8 @@
 The compiled core of pushplan (C++, see core/). Arguments are not checked.
 """
 
-from _core import (
+from pushplan._core import (
+    control as control,
     envs as envs,
     geometry as geometry,
     gtsp as gtsp,
@@ -11,11 +12,13 @@ from _core import (
     motion as motion,
     observation as observation,
     planners as planners,
+    pushing as pushing,
+    rearrangement as rearrangement,
     scenarios as scenarios,
     search as search
 )
 
 
-SOURCES: str = '2ed70bbb722d'
+SOURCES: str = '49c600bd1edc'
 
 COMPILER: str = 'GNU 12.2.0'

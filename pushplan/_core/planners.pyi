@@ -5,8 +5,8 @@ from typing import Annotated, overload
 import numpy
 from numpy.typing import NDArray
 
-import _core.interaction
-import _core.motion
+import pushplan._core.interaction
+import pushplan._core.motion
 
 
 class CostToGo:
@@ -19,7 +19,7 @@ class CostToGo:
     def sweep(self, values: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu')], free: Annotated[NDArray[numpy.bool_], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], order: Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C', device='cpu', writable=False)], ends: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], length: float) -> float:
         """`values` are those of the table, to write to."""
 
-def mark_free(free: Annotated[NDArray[numpy.bool_], dict(shape=(None, None, None), order='C', device='cpu')], first: int, last: int, x: float, y: float, cell: float, footprint: _core.motion.Footprint, walls: _core.motion.ConvexObstacles) -> None: ...
+def mark_free(free: Annotated[NDArray[numpy.bool_], dict(shape=(None, None, None), order='C', device='cpu')], first: int, last: int, x: float, y: float, cell: float, footprint: pushplan._core.motion.Footprint, walls: pushplan._core.motion.ConvexObstacles) -> None: ...
 
 def flood(open: Annotated[NDArray[numpy.bool_], dict(shape=(None, None), order='C', device='cpu', writable=False)], x: float, y: float, cell: float, goal: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], centre: int, lengths: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu')]) -> Annotated[NDArray[numpy.int64], dict(shape=(None,))]: ...
 
@@ -58,7 +58,7 @@ class PushSearch:
 class RolloutProblem:
     """Robot, static obstacles and goal."""
 
-    def __init__(self, period: float, substeps: int, limits: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], footprint: _core.motion.Footprint, walls: _core.motion.ConvexObstacles, goal: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], has_goal: bool, allowed: float) -> None: ...
+    def __init__(self, period: float, substeps: int, limits: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], footprint: pushplan._core.motion.Footprint, walls: pushplan._core.motion.ConvexObstacles, goal: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], has_goal: bool, allowed: float) -> None: ...
 
 class Rollouts:
     """Rollouts of poses among objects."""
@@ -68,35 +68,35 @@ class Rollouts:
 def roll_robots(controls: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], start: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], speed: float, turn_rate: float, problem: RolloutProblem, out: Rollouts) -> None: ...
 
 @overload
-def push_search(tree: PushTree, table: CostToGo, curvatures: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], length: float, inflation: float, pruning_factor: float, masses: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], bound: float, problem: _core.motion.PathProblem, model: _core.interaction.QuasiStatic, size: int) -> PushSearch: ...
+def push_search(tree: PushTree, table: CostToGo, curvatures: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], length: float, inflation: float, pruning_factor: float, masses: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], bound: float, problem: pushplan._core.motion.PathProblem, model: pushplan._core.interaction.QuasiStatic, size: int) -> PushSearch: ...
 
 @overload
-def push_search(tree: PushTree, table: CostToGo, curvatures: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], length: float, inflation: float, pruning_factor: float, masses: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], bound: float, problem: _core.motion.PathProblem, model: _core.interaction.IceInteraction, size: int) -> PushSearch: ...
+def push_search(tree: PushTree, table: CostToGo, curvatures: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], length: float, inflation: float, pruning_factor: float, masses: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], bound: float, problem: pushplan._core.motion.PathProblem, model: pushplan._core.interaction.IceInteraction, size: int) -> PushSearch: ...
 
 @overload
-def push_search(tree: PushTree, table: CostToGo, curvatures: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], length: float, inflation: float, pruning_factor: float, masses: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], bound: float, problem: _core.motion.PathProblem, model: _core.interaction.CalledInteraction, size: int) -> PushSearch:
+def push_search(tree: PushTree, table: CostToGo, curvatures: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], length: float, inflation: float, pruning_factor: float, masses: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], bound: float, problem: pushplan._core.motion.PathProblem, model: pushplan._core.interaction.CalledInteraction, size: int) -> PushSearch:
     """
     A search from the root of a planted tree; `size` is twice the nodes of the tree.
     """
 
 @overload
-def grow(tree: PushTree, draws: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], bound: float, longest: float, scales: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], problem: _core.motion.PathProblem, model: _core.interaction.QuasiStatic) -> int: ...
+def grow(tree: PushTree, draws: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], bound: float, longest: float, scales: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], problem: pushplan._core.motion.PathProblem, model: pushplan._core.interaction.QuasiStatic) -> int: ...
 
 @overload
-def grow(tree: PushTree, draws: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], bound: float, longest: float, scales: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], problem: _core.motion.PathProblem, model: _core.interaction.IceInteraction) -> int: ...
+def grow(tree: PushTree, draws: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], bound: float, longest: float, scales: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], problem: pushplan._core.motion.PathProblem, model: pushplan._core.interaction.IceInteraction) -> int: ...
 
 @overload
-def grow(tree: PushTree, draws: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], bound: float, longest: float, scales: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], problem: _core.motion.PathProblem, model: _core.interaction.CalledInteraction) -> int:
+def grow(tree: PushTree, draws: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], bound: float, longest: float, scales: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], problem: pushplan._core.motion.PathProblem, model: pushplan._core.interaction.CalledInteraction) -> int:
     """A node in the goal; -1: none; -2: memory is full."""
 
 @overload
-def roll_objects(model: _core.interaction.QuasiStatic, start: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu', writable=False)], rollouts: Rollouts) -> None: ...
+def roll_objects(model: pushplan._core.interaction.QuasiStatic, start: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu', writable=False)], rollouts: Rollouts) -> None: ...
 
 @overload
-def roll_objects(model: _core.interaction.IceInteraction, start: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu', writable=False)], rollouts: Rollouts) -> None: ...
+def roll_objects(model: pushplan._core.interaction.IceInteraction, start: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu', writable=False)], rollouts: Rollouts) -> None: ...
 
 @overload
-def roll_objects(model: _core.interaction.CalledInteraction, start: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu', writable=False)], rollouts: Rollouts) -> None: ...
+def roll_objects(model: pushplan._core.interaction.CalledInteraction, start: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu', writable=False)], rollouts: Rollouts) -> None: ...
 
 def propose_change(poses: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu', writable=False)], curvatures: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], draws: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], normals: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], problem: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu')], out_curvatures: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> list[int]:
     """

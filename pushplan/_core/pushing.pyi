@@ -1,0 +1,96 @@
+"""Predictive pushing of one box along a path."""
+
+from typing import Annotated
+
+import numpy
+from numpy.typing import NDArray
+
+import pushplan._core.control
+import pushplan._core.geometry
+
+
+class BoxContact:
+    """Bumper and pushed face."""
+
+    def __init__(self, front: float, half: float, curvature: float, depth: float, low: float, high: float, spread: float, friction: float) -> None: ...
+
+    def line(self, offset: float) -> tuple[float, float]: ...
+
+    def standoff(self, offset: float, angle: float) -> tuple[float, float]: ...
+
+    def velocity(self, offset: float, angle: float, c: float, s: float, v: float, w: float, dt: float, out: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> float: ...
+
+    def linearise(self, offset: float, angle: float, v: float, w: float, dt: float, widths: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], slopes: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu')]) -> None: ...
+
+    def roll_out(self, start: Annotated[NDArray[numpy.float64], dict(shape=(6), order='C', device='cpu', writable=False)], twists: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], steps: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], states: Annotated[NDArray[numpy.float64], dict(shape=(None, 6), order='C', device='cpu')], motions: Annotated[NDArray[numpy.float64], dict(shape=(None, 6), order='C', device='cpu')]) -> None: ...
+
+    def observe(self, normal: float, robot: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], box: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+
+    def box_pose(self, state: Annotated[NDArray[numpy.float64], dict(shape=(6), order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+
+class Clearance:
+    """Distances of robot and box from static things."""
+
+    def __init__(self, vertices: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], offsets: Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C', device='cpu', writable=False)], radii: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], least: float, slack: float) -> None: ...
+
+    def gaps(self, contact: BoxContact, normal: float, state: Annotated[NDArray[numpy.float64], dict(shape=(6), order='C', device='cpu', writable=False)], obstacles: pushplan._core.geometry.Obstacles) -> tuple[float, float]: ...
+
+    def free_fraction(self, contact: BoxContact, normal: float, start: Annotated[NDArray[numpy.float64], dict(shape=(6), order='C', device='cpu', writable=False)], v: float, w: float, duration: float, obstacles: pushplan._core.geometry.Obstacles) -> float: ...
+
+class PushWeights:
+    """Costs and scales of the cost."""
+
+    def __init__(self, length: float, max_speed: float, half: float, curvature: float, heading: float, offset: float, rim: float, safe: float, angle: float, grip: float, turn: float, speed: float, smoothness: float, terminal: float) -> None: ...
+
+class PushingProblem:
+    """The pushing problem of one call."""
+
+    def __init__(self, contact: BoxContact, track: pushplan._core.control.ReferencePath, weights: PushWeights, start: Annotated[NDArray[numpy.float64], dict(shape=(6), order='C', device='cpu', writable=False)], along: float, last: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], units: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], steps: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], groups: Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> None: ...
+
+class PushAssembly:
+    """Puts up pushing problems of one size."""
+
+    def __init__(self, steps: int, commands: int) -> None: ...
+
+    def assemble(self, problem: PushingProblem, nominal: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], hessian: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu')], gradient: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> float: ...
+
+class Faces:
+    """The sides of a box on one bumper."""
+
+    def __init__(self, scores: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], contacts: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], normals: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], curvatures: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> None: ...
+
+class PushTracker:
+    """Pushes one box along one path."""
+
+    def __init__(self, horizon: pushplan._core.control.Horizon, weights: PushWeights, faces: Faces, clearance: Clearance, groups: Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C', device='cpu', writable=False)], reach: float, delay: float, gain: float) -> None: ...
+
+    def begin(self, direction: float) -> None: ...
+
+    def observe(self, track: pushplan._core.control.ReferencePath, robot: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], box: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], time: float, held: float) -> bool: ...
+
+    def assemble(self, track: pushplan._core.control.ReferencePath, held: float) -> None: ...
+
+    def drive(self, obstacles: pushplan._core.geometry.Obstacles, solved: bool, time: float, held: float, out: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+
+    def send(self, v: float, w: float, time: float, held: float, out: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+
+    @property
+    def face(self) -> int: ...
+
+    @property
+    def along(self) -> float: ...
+
+    @property
+    def lateral(self) -> float: ...
+
+    @property
+    def slowed(self) -> float: ...
+
+    @property
+    def value(self) -> float: ...
+
+    @property
+    def state(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def state_in_effect(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
