@@ -1,6 +1,6 @@
 """A study on a SLURM cluster, through Dask.
 
-    pip install ".[sim,plots,cluster]"
+    pip install -e ".[sim,plots,cluster]"
     python slurm_cluster.py study.yaml runs/study
 
 Run it on a login node, or in a small job of its own. It starts workers as SLURM jobs, hands them

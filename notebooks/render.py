@@ -49,7 +49,7 @@ DPI = 110
 HEAD = """\
 # Notebooks
 
-Seven of them, in [`notebooks/`](../notebooks). `pip install ".[notebooks]"` brings what
+Seven of them, in [`notebooks/`](../notebooks). `pip install -e ".[notebooks]"` brings what
 they need. Open one with Jupyter, or read here what it says and shows. They are kept without
 outputs and run as tests. `python notebooks/render.py` makes these pages; each took 5 to 80 s on a
 2-core machine that was busy with other work (2026-11-25), which

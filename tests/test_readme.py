@@ -20,7 +20,7 @@ README = (ROOT / "README.md").read_text("utf-8")
 BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```$", README, re.MULTILINE | re.DOTALL)
 PYTHON = [text for kind, text in BLOCKS if kind == "python"]
 BENCHES = [
-    line.removeprefix('pip install ".[sim,plots]" && ')
+    line.removeprefix('pip install -e ".[sim,plots]" && ')
     for kind, text in BLOCKS
     if kind == "bash"
     for line in text.splitlines()
@@ -65,8 +65,8 @@ def run(arguments: list[str], folder: Path) -> str:
 def test_the_commands_are_where_ci_looks_for_them() -> None:
     """`.ci/run` takes the first two blocks of commands."""
     first, second = [text for kind, text in BLOCKS if kind == "bash"][:2]
-    assert first.startswith('pip install ".[sim,plots]" && pushplan bench ')
-    assert second.startswith('pip install ".[test]" && pytest')
+    assert first.startswith('pip install -e ".[sim,plots]" && pushplan bench ')
+    assert second.startswith('pip install -e ".[test]" && pytest')
     assert len(BENCHES) == 2 and len(PYTHON) == 3
 
 

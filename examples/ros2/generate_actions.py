@@ -1,7 +1,7 @@
 r"""Make the Python package ``nav2_msgs`` with the two actions of the node, where Nav2 is missing.
 
     python3.12 -m venv ros && . ros/bin/activate
-    pip install ".[ros]" catkin-pkg ros-jazzy-rclpy ros-jazzy-rmw-fastrtps-cpp \
+    pip install -e ".[ros]" catkin-pkg ros-jazzy-rclpy ros-jazzy-rmw-fastrtps-cpp \
         ros-jazzy-nav-msgs ros-jazzy-geometry-msgs ros-jazzy-visualization-msgs
     python examples/ros2/generate_actions.py
 
