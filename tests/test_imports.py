@@ -40,7 +40,7 @@ CASES = {
     "gtsp, which knows no robot": (
         "import sys; from pushplan.gtsp import read_gtsp, solve_gtsp\n"
         "print({m.split('.')[1] for m in sys.modules if m.startswith('pushplan.')}\n"
-        "      - {'gtsp', 'world', 'compiled', 'errors', 'files', 'imports'})",
+        "      - {'gtsp', 'world', 'core', '_core', 'errors', 'files', 'imports'})",
         "set()",
     ),
     "an environment that gymnasium finds by itself": (
