@@ -4,6 +4,8 @@ NB_MODULE(_core, module) {
   module.doc() = "The compiled core of pushplan (C++, see core/). Arguments are not checked.";
   module.attr("SOURCES") = PUSHPLAN_SOURCES;
   module.attr("COMPILER") = PUSHPLAN_COMPILER;
+  // caches of Python modules hold objects of these types until the interpreter ends
+  nanobind::set_leak_warnings(false);
   // rooms whose types others take come first
   auto geometry = module.def_submodule("geometry", "Shapes, obstacles and distances around them.");
   pushplan::bindings::bind_geometry(geometry);
