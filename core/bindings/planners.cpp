@@ -294,14 +294,12 @@ void bind_ships(nb::module_& module) {
   module.def(
       "arc_ahead",
       [](double goal, const Floats<1>& low, const Floats<1>& high, const OnePose& start,
-         double curvature, double step, Index count) {
+         double curvature, double step, const FloatsOut<2>& out) {
         const Box box{low.data()[0], low.data()[1], high.data()[0], high.data()[1]};
-        const std::vector<ArcPose> arc =
-            arc_ahead({goal, box}, pose(start), curvature, step, count);
-        return copied_rows<double>(std::span<const ArcPose>(arc));
+        return arc_ahead({goal, box}, pose(start), curvature, step, rows_as<ArcPose>(out));
       },
       "goal"_a, "low"_a.noconvert(), "high"_a.noconvert(), "pose"_a.noconvert(), "curvature"_a,
-      "step"_a, "count"_a, kOwned);
+      "step"_a, "out"_a.noconvert());
 }
 
 }  // namespace

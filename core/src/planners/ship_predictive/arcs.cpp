@@ -31,25 +31,20 @@ Index steer_on(const IceCostToGo& costs, const Pose& start, std::span<const doub
   return here.y >= goal ? static_cast<Index>(out.size()) : 0;
 }
 
-std::vector<ArcPose> arc_ahead(const ShipChannel& channel, const Pose& start, double curvature,
-                               double step, Index count) {
-  std::vector<ArcPose> arc;
-  arc.reserve(static_cast<std::size_t>(count + 1));
-  arc.push_back({start, curvature});
-  for (Index n = 1; n <= count; ++n) {
+Index arc_ahead(const ShipChannel& channel, const Pose& start, double curvature, double step,
+                std::span<ArcPose> out) {
+  out[0] = {start, curvature};
+  for (std::size_t n = 1; n < out.size(); ++n) {
     const auto steps = static_cast<double>(n);
     const double half = 0.5 * curvature * step * steps;
     const double chord = step * steps * (half != 0.0 ? std::sin(half) / half : 1.0);
     const Vec2 place{start.x + chord * std::cos(start.theta + half),
                      start.y + chord * std::sin(start.theta + half)};
-    if (place.x < channel.box.x_min || place.x > channel.box.x_max ||
-        place.y < channel.box.y_min || place.y > channel.box.y_max) {
-      return {};
-    }
-    arc.push_back({{place.x, place.y, start.theta + 2.0 * half}, curvature});
-    if (place.y >= channel.goal) break;
+    if (!channel.box.contains(place, 0.0)) return 0;
+    out[n] = {{place.x, place.y, start.theta + 2.0 * half}, curvature};
+    if (place.y >= channel.goal) return static_cast<Index>(n) + 1;
   }
-  return arc;
+  return static_cast<Index>(out.size());
 }
 
 CostAhead cost_ahead(const IceCostToGo& costs, std::span<const ArcPose> arc, double step) {

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <span>
-#include <vector>
 
 #include "pushplan/planners/ship_predictive/ice_cost_to_go.hpp"
 
@@ -26,10 +25,11 @@ Index steer_on(const IceCostToGo& costs, const Pose& start,
                double step,                         // length of the arcs [m]
                std::span<ArcPose> out);
 
-/// An arc from a pose on, cut off at the goal; empty where it leaves the channel.
-std::vector<ArcPose> arc_ahead(const ShipChannel& channel, const Pose& start, double curvature,
-                               double step,   // distance between poses along the arc [m]
-                               Index count);  // number of them after the first
+/// Lays an arc from a pose on, cut off at the goal. `out` has room for all of it, the pose included.
+/// Returns the number of poses, 0 where it leaves the channel.
+Index arc_ahead(const ShipChannel& channel, const Pose& start, double curvature,
+                double step,  // distance between poses along the arc [m]
+                std::span<ArcPose> out);
 
 struct CostAhead {
   double work;   // along an arc, if no floe moved [kg m]
