@@ -71,13 +71,23 @@ def get_requires_for_build_sdist(settings: dict[str, Any] | None = None) -> list
     return list(_build.get_requires_for_build_sdist(settings))
 
 
+def prepare_metadata_for_build_wheel(folder: str, settings: Any = None) -> str:
+    """Write the metadata of a wheel, for which nothing is compiled."""
+    return str(_build.prepare_metadata_for_build_wheel(folder, settings))
+
+
+def prepare_metadata_for_build_editable(folder: str, settings: Any = None) -> str:
+    """Write the metadata of an editable installation, for which nothing is compiled."""
+    return str(_build.prepare_metadata_for_build_editable(folder, settings))
+
+
 def build_wheel(folder: str, settings: Any = None, metadata: str | None = None) -> str:
     """Build a wheel."""
     return _with_compiler(_build.build_wheel, folder, settings, metadata)
 
 
 def build_editable(folder: str, settings: Any = None, metadata: str | None = None) -> str:
-    """Build the module into the tree, and a wheel that leads to the tree."""
+    """Build the module, and a wheel that leads to the tree."""
     return _with_compiler(_build.build_editable, folder, settings, metadata)
 
 
