@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from pushplan.compiled import kernel
 from pushplan.control.limits import clamp_twist
-from pushplan.geometry.transforms import arc_step
-from pushplan.motion.collision import ConvexObstacles, Footprint, footprint, is_free, obstacles
+from pushplan.core import control as core
+from pushplan.core import motion
+from pushplan.motion.collision import footprint, obstacles
 from pushplan.world import Twist, World
-from pushplan.world.checks import FloatArray
 
 _AHEAD = (1.0, 0.5, 0.25, 0.0)
 """Distances straight ahead at which circles are tried [circumscribed radii]."""
@@ -33,43 +30,23 @@ def waiting_twist(world: World) -> Twist:
     robot = world.robot
     if robot.can_stop:
         return Twist(0.0, 0.0)
-    shape = footprint(robot)
-    walls = obstacles(world.static)
-    scratch = np.empty_like(shape.vertices)
-    at = np.empty(3)
+    shape = motion.Footprint(*footprint(robot))
+    walls = motion.ConvexObstacles(*obstacles(world.static))
+    radius = footprint(robot).radius
     circle = math.tau * robot.turning_radius
-    step = min(_SPACING * shape.radius, circle / 16.0)
+    step = min(_SPACING * radius, circle / 16.0)
 
     def clear(twist: Twist, length: float, ahead: float = 0.0) -> float:
         """Return the clear length of an arc, up to ``length``, that begins straight ahead."""
         turn = step * twist.angular / twist.linear
         first = math.ceil(ahead / step)
         most = math.ceil((ahead + length) / step)
-        at[:] = world.robot_pose
-        return step * _clear_steps(step, turn, first, most, shape, walls, at, scratch) - ahead
+        at = world.robot_pose
+        return step * core.clear_steps(step, turn, first, most, shape, walls, at) - ahead
 
     arcs = [clamp_twist(robot, robot.max_speed, share * robot.max_turn_rate) for share in _TURNS]
     for ahead in _AHEAD:
         for arc in arcs[-2:]:
-            if clear(arc, circle, ahead * shape.radius) >= circle:
+            if clear(arc, circle, ahead * radius) >= circle:
                 return arcs[0] if ahead else arc
-    return max(arcs, key=lambda arc: clear(arc, circle + shape.radius))
-
-
-@kernel
-def _clear_steps(
-    step: float,
-    turn: float,
-    first: int,
-    most: int,
-    shape: Footprint,
-    walls: ConvexObstacles,
-    at: FloatArray,  # (3,) where it begins; ends where it touches
-    scratch: FloatArray,  # (V, 2) memory for the corners
-) -> int:
-    """Return the number of steps, the first ones straight, that the robot can go before a wall."""
-    for done in range(most):
-        arc_step(at, step, turn if done >= first else 0.0, at)
-        if not is_free(at, shape, walls, scratch):
-            return done
-    return most
+    return max(arcs, key=lambda arc: clear(arc, circle + radius))

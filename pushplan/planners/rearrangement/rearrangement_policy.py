@@ -13,7 +13,6 @@ from pushplan.control import EpisodeClock
 from pushplan.control.recovery import warm_up_recovery
 from pushplan.geometry.transforms import arc_step
 from pushplan.planners.arguments import check_pusher
-from pushplan.planners.pushing import warm_up as warm_up_pushing
 from pushplan.planners.rearrangement.approach import approach_tree
 from pushplan.planners.rearrangement.controller_kernels import steer_push
 from pushplan.planners.rearrangement.push_scene import PushScene
@@ -80,7 +79,6 @@ class RearrangementPolicy(ABC):
 @functools.cache
 def warm_up_rearrangement() -> None:
     """Solve, push and look for every kind of push; no kernel is for one kind of task alone."""
-    warm_up_pushing()
     scene = _small_scene()
     relocating_pushes(scene, 0, approach_tree(scene))
     warm_up_recovery()
