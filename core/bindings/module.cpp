@@ -9,6 +9,8 @@ NB_MODULE(_core, module) {
   pushplan::bindings::bind_geometry(geometry);
   auto interaction = module.def_submodule("interaction", "Models of what the robot pushes.");
   pushplan::bindings::bind_interaction(interaction);
+  auto search = module.def_submodule("search", "Shortest paths on graphs.");
+  pushplan::bindings::bind_search(search);
   auto motion = module.def_submodule("motion", "Arcs, shortcuts and state lattices.");
   pushplan::bindings::bind_motion(motion);
   pushplan::bindings::bind_motion_paths(motion);
@@ -30,6 +32,4 @@ NB_MODULE(_core, module) {
   pushplan::bindings::bind_rearrangement(rearrangement);
   auto scenarios = module.def_submodule("scenarios", "Steps of the ice generator.");
   pushplan::bindings::bind_scenarios(scenarios);
-  auto search = module.def_submodule("search", "Shortest paths on graphs.");
-  pushplan::bindings::bind_search(search);
 }

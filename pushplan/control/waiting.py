@@ -9,7 +9,13 @@ import numpy as np
 from pushplan.compiled import kernel
 from pushplan.control.limits import clamp_twist
 from pushplan.geometry.transforms import arc_step
-from pushplan.motion.collision import ConvexObstacles, Footprint, footprint, is_free, obstacles
+from pushplan.motion.collision import (
+    ConvexObstacles,
+    Footprint,
+    footprint_arrays,
+    is_free,
+    obstacle_arrays,
+)
 from pushplan.world import Twist, World
 from pushplan.world.checks import FloatArray
 
@@ -33,8 +39,8 @@ def waiting_twist(world: World) -> Twist:
     robot = world.robot
     if robot.can_stop:
         return Twist(0.0, 0.0)
-    shape = footprint(robot)
-    walls = obstacles(world.static)
+    shape = footprint_arrays(robot)
+    walls = obstacle_arrays(world.static)
     scratch = np.empty_like(shape.vertices)
     at = np.empty(3)
     circle = math.tau * robot.turning_radius
