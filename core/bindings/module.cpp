@@ -1,7 +1,11 @@
 #include "arrays.hpp"
 
+namespace nb = nanobind;
+
 NB_MODULE(_core, module) {
   module.doc() = "The compiled core of pushplan (C++, see core/). Arguments are not checked.";
+  // caches of Python hold shapes until the interpreter ends: no leak, and nothing to print
+  nb::set_leak_warnings(false);
   module.attr("SOURCES") = PUSHPLAN_SOURCES;
   module.attr("COMPILER") = PUSHPLAN_COMPILER;
   // rooms whose types others take come first

@@ -1,4 +1,4 @@
-"""What it costs to cover floes, and sums over a map of such costs."""
+"""Costs of covering floes, and sums over a map of such costs."""
 
 from __future__ import annotations
 
