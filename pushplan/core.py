@@ -16,8 +16,10 @@ try:
         gtsp,
         interaction,
         motion,
+        planners,
         pushing,
         rearrangement,
+        search,
     )
 except ImportError as error:
     raise PushplanError(
@@ -34,8 +36,10 @@ __all__ = [
     "interaction",
     "is_stale",
     "motion",
+    "planners",
     "pushing",
     "rearrangement",
+    "search",
 ]
 
 

@@ -19,6 +19,6 @@ from pushplan._core import (
 )
 
 
-SOURCES: str = '1ff0ec087c30'
+SOURCES: str = '6f55f2f28b7c'
 
 COMPILER: str = 'GNU 12.2.0'

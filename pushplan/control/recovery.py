@@ -11,7 +11,7 @@ from pushplan.control.limits import clamp_twist
 from pushplan.control.pose_follower import PoseFollower
 from pushplan.control.progress_checker import StallChecker
 from pushplan.geometry.transforms import arc_step
-from pushplan.motion.collision import footprint, obstacles, static_depth
+from pushplan.motion.collision import footprint_arrays, obstacle_arrays, static_depth
 from pushplan.motion.recovery_path import recovery_path
 from pushplan.world import Drive, GoalDisc, Movables, StaticMap, Twist, World, box_delivery_robot
 from pushplan.world.checks import FloatArray
@@ -59,8 +59,8 @@ class Recovery:
         self._looks = looks
         self._searches = searches and robot.drive is Drive.DIFFERENTIAL  # it turns on the spot
         self._from = self._tried_from = world.robot_pose
-        self._shape = footprint(robot)
-        self._walls = obstacles(world.static)
+        self._shape = footprint_arrays(robot)
+        self._walls = obstacle_arrays(world.static)
         self._scratch = np.empty_like(self._shape.vertices)
         skip %= len(_WAYS)
         commands = (

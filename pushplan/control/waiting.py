@@ -6,7 +6,6 @@ import math
 
 from pushplan.control.limits import clamp_twist
 from pushplan.core import control as core
-from pushplan.core import motion
 from pushplan.motion.collision import footprint, obstacles
 from pushplan.world import Twist, World
 
@@ -30,11 +29,10 @@ def waiting_twist(world: World) -> Twist:
     robot = world.robot
     if robot.can_stop:
         return Twist(0.0, 0.0)
-    shape = motion.Footprint(*footprint(robot))
-    walls = motion.ConvexObstacles(*obstacles(world.static))
-    radius = footprint(robot).radius
+    shape = footprint(robot)
+    walls = obstacles(world.static)
     circle = math.tau * robot.turning_radius
-    step = min(_SPACING * radius, circle / 16.0)
+    step = min(_SPACING * shape.radius, circle / 16.0)
 
     def clear(twist: Twist, length: float, ahead: float = 0.0) -> float:
         """Return the clear length of an arc, up to ``length``, that begins straight ahead."""
@@ -47,6 +45,6 @@ def waiting_twist(world: World) -> Twist:
     arcs = [clamp_twist(robot, robot.max_speed, share * robot.max_turn_rate) for share in _TURNS]
     for ahead in _AHEAD:
         for arc in arcs[-2:]:
-            if clear(arc, circle, ahead * radius) >= circle:
+            if clear(arc, circle, ahead * shape.radius) >= circle:
                 return arcs[0] if ahead else arc
-    return max(arcs, key=lambda arc: clear(arc, circle + radius))
+    return max(arcs, key=lambda arc: clear(arc, circle + shape.radius))

@@ -1,27 +1,19 @@
-"""The default interaction model: quasi-static pushing, compiled."""
+"""The default interaction model: quasi-static pushing."""
 
 from __future__ import annotations
 
 import functools
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pushplan.compiled import kernel, owned
+from pushplan.compiled import owned
+from pushplan.core import interaction as core
 from pushplan.geometry import polygon_inertia
-from pushplan.interaction.advance import advance_objects
 from pushplan.interaction.interaction_model import Interaction, checked_path
-from pushplan.interaction.kernels import (
-    Bodies,
-    Scratch,
-    Settings,
-    advance,
-    make_scratch,
-    sweep_path,
-)
+from pushplan.interaction.kernels import Bodies, Settings
 from pushplan.world import Movables, RobotModel, StaticMap, World
 from pushplan.world.checked_fields import (
     CheckedFields,
@@ -30,40 +22,12 @@ from pushplan.world.checked_fields import (
     PositiveFraction,
     PositiveInt,
 )
-from pushplan.world.checks import FloatArray, IntArray
+from pushplan.world.checks import FloatArray, frozen
 from pushplan.world.outline import flatten, outline_boxes, unflatten
 
 _TOLERANCE = 1e-3  # overlap that counts as resolved [sizes of the thinnest body]
 _MOST_SLENDER = 30.0
 """A body that is thinner than the robot by more sets no finer steps, which would take forever."""
-
-
-class QuasiStaticContacts(NamedTuple):
-    """`QuasiStatic` in compiled form, with memory for one thread."""
-
-    inverse_masses: FloatArray  # (K,)
-    radii: FloatArray  # (K,) circumscribed radii [m]
-    tests: IntArray  # (1,) pairs of outlines that were tested so far
-    bodies: Bodies
-    settings: Settings
-    scratch: Scratch
-
-
-@kernel
-def _step(
-    model: QuasiStaticContacts,
-    robot_from: FloatArray,
-    robot_to: FloatArray,
-    poses: FloatArray,
-    moved: FloatArray,
-) -> bool:
-    """Drive the robot a step by the contact kernels."""
-    return bool(
-        advance(robot_from, robot_to, poses, moved, model.bodies, model.settings, model.scratch)
-    )
-
-
-advance_objects.add(QuasiStaticContacts, _step)
 
 
 @dataclass(frozen=True)
@@ -112,26 +76,20 @@ class QuasiStatic(CheckedFields):
             static_friction=float(self.static_friction),
         )
 
-    def compiled(self, world: World) -> QuasiStaticContacts:
-        """The model as `pushplan.interaction.advance.advance_objects` takes it."""
-        bodies = self.bodies(world)
-        scratch = make_scratch(bodies)
-        return QuasiStaticContacts(
-            bodies.inverse_masses,
-            bodies.radii,
-            scratch.tests,
-            bodies,
-            self.settings(world),
-            scratch,
+    def compiled(self, world: World) -> core.QuasiStatic:
+        """The model for the shapes of this world, as `CompiledInteraction` has it."""
+        bodies = _core_bodies(
+            world.robot, _Shapes(world.movables), world.static, self.gyration_scale
         )
+        return core.QuasiStatic(bodies, *self.settings(world))
 
     def sweep(self, world: World, path: ArrayLike) -> Interaction:
         """Predict the motion of every object; see `InteractionModel.sweep`."""
         robot_path = checked_path(path)
         poses = world.movables.poses.copy()
         out = np.empty((len(robot_path), len(poses), 3))
-        jammed = sweep_path(robot_path, poses, self.bodies(world), self.settings(world), out)
-        return Interaction(out, world.movables.masses, int(jammed))
+        jammed = self.compiled(world).sweep(robot_path, poses, out)
+        return Interaction(out, world.movables.masses, jammed)
 
 
 class _Shapes:
@@ -174,9 +132,21 @@ def _width(outlines: FloatArray) -> float:
 
 
 @functools.lru_cache(maxsize=32)
-def _bodies(robot: RobotModel, shapes: _Shapes, static: StaticMap, gyration: float) -> Bodies:
+def _gyration(shapes: _Shapes) -> FloatArray:
+    """(K,) c² of the objects at a scale of 1 [m²]."""
     movables = shapes.movables
     squares = [polygon_inertia(movables.drawn_outline(k)) for k in range(len(movables))]
+    return frozen(np.array(squares, dtype=np.float64))
+
+
+def inverse_gyration(movables: Movables) -> FloatArray:
+    """(K,) inertia of the objects over their masses, inverted [1/m²]."""
+    return 1.0 / _gyration(_Shapes(movables))
+
+
+@functools.lru_cache(maxsize=32)
+def _bodies(robot: RobotModel, shapes: _Shapes, static: StaticMap, gyration: float) -> Bodies:
+    movables = shapes.movables
     vertices, offsets = flatten(static.convex_parts)
     return Bodies(
         robot_vertices=owned(robot.vertices),
@@ -187,8 +157,15 @@ def _bodies(robot: RobotModel, shapes: _Shapes, static: StaticMap, gyration: flo
         offsets=owned(movables.offsets),
         radii=owned(movables.radii),
         inverse_masses=1.0 / movables.masses,
-        inverse_gyration=1.0 / (np.array(squares, dtype=np.float64) * gyration**2),
+        inverse_gyration=1.0 / (_gyration(shapes) * gyration**2),
         static_vertices=owned(vertices),
         static_offsets=owned(offsets),
         static_boxes=outline_boxes(vertices, offsets),
     )
+
+
+@functools.lru_cache(maxsize=32)
+def _core_bodies(
+    robot: RobotModel, shapes: _Shapes, static: StaticMap, gyration: float
+) -> core.Bodies:
+    return core.Bodies(*_bodies(robot, shapes, static, gyration))

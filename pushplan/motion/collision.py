@@ -10,6 +10,7 @@ import numpy as np
 from shapely import Polygon
 
 from pushplan.compiled import kernel, owned
+from pushplan.core import motion as core
 from pushplan.geometry import convex_overlap, convex_penetration
 from pushplan.geometry.transforms import transform_points
 from pushplan.world import RobotModel, StaticMap
@@ -39,8 +40,37 @@ class ConvexObstacles(NamedTuple):
 
 
 @functools.lru_cache(maxsize=64)
-def footprint(robot: RobotModel, margin: float = 0.0) -> Footprint:
+def footprint(robot: RobotModel, margin: float = 0.0) -> core.Footprint:
     """Return the robot's parts that count at walls, grown by ``margin`` [m] with sharp corners."""
+    return core.Footprint(*footprint_arrays(robot, margin))
+
+
+def obstacles(
+    static: StaticMap, outlines: Sequence[FloatArray] = (), bounds: FloatArray | None = None
+) -> core.ConvexObstacles:
+    """Everything static, and further convex outlines in the world frame.
+
+    Args:
+        static: the map.
+        outlines: of what else is in the way, each (N, 2) [m].
+        bounds: (4,) other bounds of the workspace [m]; a pose outside is not free.
+    """
+    if not outlines and bounds is None:
+        return _core_walls(static)
+    arrays = obstacle_arrays(static, outlines)
+    if bounds is not None:
+        arrays = arrays._replace(bounds=bounds)
+    return core.ConvexObstacles(*arrays)
+
+
+@functools.lru_cache(maxsize=32)
+def _core_walls(static: StaticMap) -> core.ConvexObstacles:
+    return core.ConvexObstacles(*_walls(static))
+
+
+@functools.lru_cache(maxsize=64)
+def footprint_arrays(robot: RobotModel, margin: float = 0.0) -> Footprint:
+    """`footprint` for kernels."""
     parts = list(robot.wall_parts)
     if margin != 0.0:
         grown = [Polygon(part).buffer(margin, join_style="mitre").exterior for part in parts]
@@ -50,8 +80,8 @@ def footprint(robot: RobotModel, margin: float = 0.0) -> Footprint:
     return Footprint(owned(vertices), owned(offsets), radius)
 
 
-def obstacles(static: StaticMap, outlines: Sequence[FloatArray] = ()) -> ConvexObstacles:
-    """Everything static, and further convex outlines in the world frame."""
+def obstacle_arrays(static: StaticMap, outlines: Sequence[FloatArray] = ()) -> ConvexObstacles:
+    """`obstacles` for kernels."""
     if not outlines:
         return _walls(static)
     return _obstacles(static, (*static.convex_parts, *outlines))
@@ -123,17 +153,6 @@ def is_free(
                 if convex_overlap(scratch[shape.offsets[p] : shape.offsets[p + 1]], obstacle):
                     return False
     return True
-
-
-@kernel
-def first_blocked(
-    poses: FloatArray, count: int, shape: Footprint, among: ConvexObstacles, scratch: FloatArray
-) -> int:
-    """Index of the first of the first ``count`` poses that is not free, or ``count``."""
-    for i in range(count):
-        if not is_free(poses[i], shape, among, scratch):
-            return i
-    return count
 
 
 @kernel

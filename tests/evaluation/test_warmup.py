@@ -62,10 +62,7 @@ print(json.dumps({
 }))
 """
 
-TWICE = {
-    "pushplan.search.astar.search": "lattices of a ship's poses and of pushed objects",
-    "pushplan.planners.mppi.rollout_kernels.roll_objects": "objects in a room, floes in water",
-}
+TWICE: dict[str, str] = {}
 """Kernels that Python calls with more than one type of arguments, and why."""
 DISTINCT = {expected_kernels(name): name for name in reversed(policy_names())}
 """Policies that need kernels of their own; of those with the same ones, the first."""

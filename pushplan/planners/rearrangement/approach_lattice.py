@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pushplan.interaction.kernels import Bodies
-from pushplan.motion.collision import footprint, obstacles
+from pushplan.motion.collision import footprint_arrays, obstacle_arrays
 from pushplan.planners.rearrangement.pose_grid_kernels import (
     HEADINGS,
     Layers,
@@ -56,7 +56,7 @@ def contact_grid(
     sides = static.bounds[2:] - static.bounds[:2]
     side = max(cell, _LEAST_CELL * float(sides.max()) / size) * size
     grid = make_pose_grid(robot, static, part * side, away)
-    return ContactGrid(grid, contact_depths(grid, footprint(robot, away), poses, bodies))
+    return ContactGrid(grid, contact_depths(grid, footprint_arrays(robot, away), poses, bodies))
 
 
 @functools.lru_cache(maxsize=8)
@@ -79,8 +79,8 @@ def make_pose_grid(robot: RobotModel, static: StaticMap, step: float, margin: fl
         np.empty((len(HEADINGS), rows, cols), dtype=np.bool_),
         np.zeros((2, len(HEADINGS), rows, cols), dtype=np.bool_),
     )
-    shape = footprint(robot, margin)
-    among = obstacles(static)
+    shape = footprint_arrays(robot, margin)
+    among = obstacle_arrays(static)
     block_poses(grid, shape, among)
     block_moves(grid, shape, among)
     return grid._replace(blocked=frozen(grid.blocked), blocked_moves=frozen(grid.blocked_moves))

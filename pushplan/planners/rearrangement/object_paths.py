@@ -14,7 +14,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from pushplan.geometry import GoalDistances, goal_distances
-from pushplan.motion.collision import footprint, obstacles
+from pushplan.motion.collision import footprint_arrays, obstacle_arrays
 from pushplan.motion.done_places import done_places
 from pushplan.planners.rearrangement.goal_kernels import REMOVED
 from pushplan.planners.rearrangement.pose_grid_kernels import LENGTHS, MOVES
@@ -161,8 +161,8 @@ class PushCostToGo:
             open_cells,
             np.array(SHIFTS) * half_width,
             float(robot.vertices[:, 0].max()) + slack + _HALF_DEPTH * radius,
-            footprint(robot, margin),
-            obstacles(static),
+            footprint_arrays(robot, margin),
+            obstacle_arrays(static),
         )
         costs = self._search(open_cells, pushable, _is_goal(goal, radius, middles, self._step))
         away, (i, j) = distance_transform_edt(~np.isfinite(costs), return_indices=True)

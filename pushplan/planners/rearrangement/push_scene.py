@@ -12,7 +12,7 @@ import numpy as np
 
 from pushplan.interaction import QuasiStatic
 from pushplan.interaction.kernels import Bodies, Settings
-from pushplan.motion.collision import footprint, obstacles
+from pushplan.motion.collision import footprint_arrays, obstacle_arrays
 from pushplan.motion.keep_out import keep_out
 from pushplan.planners.arguments import check_pusher
 from pushplan.planners.rearrangement.approach_lattice import ContactGrid, contact_grid
@@ -243,9 +243,9 @@ class PushScene:
             step=0.1 * self.size,
             turn_cost=self.turn_cost,
             arm=self.arm,
-            shape=footprint(robot, margin),
-            tight=footprint(robot, 0.5 * margin),
-            among=obstacles(keep_out(self.world)),
+            shape=footprint_arrays(robot, margin),
+            tight=footprint_arrays(robot, 0.5 * margin),
+            among=obstacle_arrays(keep_out(self.world)),
             poses=self.poses,
             bodies=self.bodies,
             weights=self.contact_weights,

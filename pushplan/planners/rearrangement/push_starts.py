@@ -11,7 +11,13 @@ from functools import cached_property
 import numpy as np
 
 from pushplan.geometry import convex_penetration
-from pushplan.motion.collision import ConvexObstacles, Footprint, footprint, is_free, obstacles
+from pushplan.motion.collision import (
+    ConvexObstacles,
+    Footprint,
+    footprint_arrays,
+    is_free,
+    obstacle_arrays,
+)
 from pushplan.planners.rearrangement.controller_kernels import along_path
 from pushplan.planners.rearrangement.push_pose_kernels import pose_behind_outline
 from pushplan.world import Movables, RobotModel, StaticMap
@@ -87,7 +93,7 @@ class PushStarts:
 
     @cached_property
     def _fit(self) -> tuple[Footprint, ConvexObstacles]:
-        return footprint(self.robot, self.margin), obstacles(self.static)
+        return footprint_arrays(self.robot, self.margin), obstacle_arrays(self.static)
 
     def fits(self, pose: FloatArray) -> bool:
         """Return True if the robot fits at a pose (3,) among static obstacles."""
