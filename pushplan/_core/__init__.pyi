@@ -19,6 +19,6 @@ from pushplan._core import (
 )
 
 
-SOURCES: str = '6f55f2f28b7c'
+SOURCES: str = 'b42d26c5c55c'
 
 COMPILER: str = 'GNU 12.2.0'

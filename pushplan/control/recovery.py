@@ -10,8 +10,9 @@ import numpy as np
 from pushplan.control.limits import clamp_twist
 from pushplan.control.pose_follower import PoseFollower
 from pushplan.control.progress_checker import StallChecker
+from pushplan.core import motion
 from pushplan.geometry.transforms import arc_step
-from pushplan.motion.collision import footprint_arrays, obstacle_arrays, static_depth
+from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.recovery_path import recovery_path
 from pushplan.world import Drive, GoalDisc, Movables, StaticMap, Twist, World, box_delivery_robot
 from pushplan.world.checks import FloatArray
@@ -59,9 +60,10 @@ class Recovery:
         self._looks = looks
         self._searches = searches and robot.drive is Drive.DIFFERENTIAL  # it turns on the spot
         self._from = self._tried_from = world.robot_pose
-        self._shape = footprint_arrays(robot)
-        self._walls = obstacle_arrays(world.static)
-        self._scratch = np.empty_like(self._shape.vertices)
+        shape = footprint(robot)
+        self._radius = shape.radius
+        self._bounds = world.static.bounds
+        self._walls = motion.CollisionChecker(shape, obstacles(world.static))
         skip %= len(_WAYS)
         commands = (
             clamp_twist(robot, speed * robot.max_speed, turn * robot.max_turn_rate)
@@ -125,21 +127,18 @@ class Recovery:
 
     def _is_closed(self, pose: FloatArray, way: Twist) -> bool:
         """Return True if a motion leads deeper into static obstacles than the robot is."""
-        size = self._shape.radius
+        size = self._radius
         here = np.array(pose)
         there = np.empty(3)
-        x_min, y_min, x_max, y_max = self._walls.bounds
+        x_min, y_min, x_max, y_max = self._bounds
         seconds = _LOOK * size / (abs(way.linear) + size * abs(way.angular))
-        allowed = self._depth(here) + _DEEPER * size
+        allowed = self._walls.depth(here) + _DEEPER * size
         for part in np.linspace(0.0, seconds, _POSES + 1)[1:]:
             arc_step(here, way.linear * part, way.angular * part, there)
             inside = x_min <= there[0] <= x_max and y_min <= there[1] <= y_max
-            if not inside or self._depth(there) > allowed:
+            if not inside or self._walls.depth(there) > allowed:
                 return True
         return False
-
-    def _depth(self, pose: FloatArray) -> float:
-        return float(static_depth(pose, self._shape, self._walls, self._scratch))
 
 
 @functools.cache

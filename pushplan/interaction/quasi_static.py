@@ -5,15 +5,14 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pushplan.compiled import owned
 from pushplan.core import interaction as core
 from pushplan.geometry import polygon_inertia
 from pushplan.interaction.interaction_model import Interaction, checked_path
-from pushplan.interaction.kernels import Bodies, Settings
 from pushplan.world import Movables, RobotModel, StaticMap, World
 from pushplan.world.checked_fields import (
     CheckedFields,
@@ -28,6 +27,17 @@ from pushplan.world.outline import flatten, outline_boxes, unflatten
 _TOLERANCE = 1e-3  # overlap that counts as resolved [sizes of the thinnest body]
 _MOST_SLENDER = 30.0
 """A body that is thinner than the robot by more sets no finer steps, which would take forever."""
+
+
+class Settings(NamedTuple):
+    """Numerical settings of the core's `QuasiStatic`."""
+
+    max_step: float  # Longest motion of a robot corner in one resolution step [m]
+    tolerance: float  # Overlap that counts as resolved [m]
+    jam_depth: float  # Overlap that cannot be resolved and counts as a jam [m]
+    iterations: int  # Gauss-Seidel rounds in one step
+    friction: float  # Coulomb coefficient between robot and objects
+    static_friction: float  # Coulomb coefficient between objects and walls
 
 
 @dataclass(frozen=True)
@@ -60,8 +70,8 @@ class QuasiStatic(CheckedFields):
     iterations: PositiveInt = 12
     static_friction: NonNegativeFloat = 0.0
 
-    def bodies(self, world: World) -> Bodies:
-        """The world's shapes as the compiled kernels read them; cached."""
+    def bodies(self, world: World) -> core.Bodies:
+        """The world's shapes as the core reads them; cached."""
         return _bodies(world.robot, _Shapes(world.movables), world.static, self.gyration_scale)
 
     def settings(self, world: World) -> Settings:
@@ -78,10 +88,7 @@ class QuasiStatic(CheckedFields):
 
     def compiled(self, world: World) -> core.QuasiStatic:
         """The model for the shapes of this world, as `CompiledInteraction` has it."""
-        bodies = _core_bodies(
-            world.robot, _Shapes(world.movables), world.static, self.gyration_scale
-        )
-        return core.QuasiStatic(bodies, *self.settings(world))
+        return core.QuasiStatic(self.bodies(world), *self.settings(world))
 
     def sweep(self, world: World, path: ArrayLike) -> Interaction:
         """Predict the motion of every object; see `InteractionModel.sweep`."""
@@ -145,27 +152,20 @@ def inverse_gyration(movables: Movables) -> FloatArray:
 
 
 @functools.lru_cache(maxsize=32)
-def _bodies(robot: RobotModel, shapes: _Shapes, static: StaticMap, gyration: float) -> Bodies:
+def _bodies(robot: RobotModel, shapes: _Shapes, static: StaticMap, gyration: float) -> core.Bodies:
     movables = shapes.movables
     vertices, offsets = flatten(static.convex_parts)
-    return Bodies(
-        robot_vertices=owned(robot.vertices),
-        robot_offsets=owned(robot.offsets),
+    return core.Bodies(
+        robot_vertices=robot.vertices,
+        robot_offsets=robot.offsets,
         wall_parts=len(robot.wall_parts),
         robot_radius=robot.circumscribed_radius,
-        vertices=owned(movables.vertices),
-        offsets=owned(movables.offsets),
-        radii=owned(movables.radii),
+        vertices=movables.vertices,
+        offsets=movables.offsets,
+        radii=movables.radii,
         inverse_masses=1.0 / movables.masses,
         inverse_gyration=1.0 / (_gyration(shapes) * gyration**2),
-        static_vertices=owned(vertices),
-        static_offsets=owned(offsets),
-        static_boxes=outline_boxes(vertices, offsets),
+        wall_vertices=vertices,
+        wall_offsets=offsets,
+        wall_boxes=outline_boxes(vertices, offsets),
     )
-
-
-@functools.lru_cache(maxsize=32)
-def _core_bodies(
-    robot: RobotModel, shapes: _Shapes, static: StaticMap, gyration: float
-) -> core.Bodies:
-    return core.Bodies(*_bodies(robot, shapes, static, gyration))

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from pushplan.control import ImmediateExecutor, PoseFollower, Recovery
+from pushplan.control.recovery import warm_up_recovery
 from pushplan.planners.rearrangement.push import Push, PushCost, PushHistory, push_plan, signature
 from pushplan.planners.rearrangement.push_choice import (
     PendingChoice,
@@ -23,8 +24,6 @@ from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.planners.rearrangement.rearrangement_policy import (
     RearrangementPolicy,
-    warm_up_rearrangement,
-    warm_up_steering,
 )
 from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.world import InvalidInputError, Plan, PlanningExecutor, Stop, Twist, World
@@ -113,8 +112,7 @@ class GtspMpc(RearrangementPolicy):
 
     def warm_up(self) -> None:
         """Load the kernels that an episode may need."""
-        warm_up_rearrangement()
-        warm_up_steering()
+        warm_up_recovery()
         super().warm_up()
 
     def _act(self, world: World) -> Twist:

@@ -10,14 +10,9 @@ from typing import Any
 import numpy as np
 
 from pushplan.control import EpisodeClock
-from pushplan.control.recovery import warm_up_recovery
 from pushplan.geometry.transforms import arc_step
 from pushplan.planners.arguments import check_pusher
-from pushplan.planners.rearrangement.approach import approach_tree
-from pushplan.planners.rearrangement.controller_kernels import steer_push
-from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
-from pushplan.planners.rearrangement.relocation import relocating_pushes
 from pushplan.planners.warm_up_worlds import warm_up_worlds
 from pushplan.world import Twist, World
 from pushplan.world.checks import expect
@@ -77,22 +72,6 @@ class RearrangementPolicy(ABC):
 
 
 @functools.cache
-def warm_up_rearrangement() -> None:
-    """Solve, push and look for every kind of push; no kernel is for one kind of task alone."""
-    scene = _small_scene()
-    relocating_pushes(scene, 0, approach_tree(scene))
-    warm_up_recovery()
-
-
-@functools.cache
-def warm_up_steering() -> None:
-    """Steer a push outside rollouts, as `GeometricPusher` does; few episodes come to that."""
-    here = np.zeros(3)
-    scene = _small_scene()
-    steer_push(here, here, np.eye(2), 0.0, 0.0, scene.controller)
-
-
-@functools.cache
 def _drive_in_small_worlds(policy: Callable[[], RearrangementPolicy]) -> None:
     """Let a new policy plan and drive for boxes in each kind of task."""
     for world in warm_up_worlds("rearrangement"):
@@ -104,7 +83,3 @@ def _drive_in_small_worlds(policy: Callable[[], RearrangementPolicy]) -> None:
             here = np.array(world.robot_pose)
             arc_step(here, _PERIOD * twist.linear, _PERIOD * twist.angular, pose)
             world = world.moved(robot_pose=pose, time=world.time + _PERIOD)
-
-
-def _small_scene() -> PushScene:
-    return PushScene(warm_up_worlds("rearrangement")[0], RearrangementConfig())
