@@ -161,7 +161,8 @@ def test_the_bound_holds_for_random_walks_over_random_prices(
     rng = np.random.default_rng(seed)
     rows, columns, cell = 30, 20, 0.5
     grid = rng.exponential(1.0, (rows, columns)) * (rng.random((rows, columns)) < 0.4)
-    sums = np.concatenate([np.zeros((columns, 1)), np.cumsum(grid.T, axis=1)], axis=1)
+    sums = np.zeros((columns, rows + 1))
+    sums[:, 1:] = np.cumsum(grid.T, axis=1)
     window = HullWindow(half, reach, 0, 1, 1.0, cell, 0.3)
     places, across = np.array([2, 6, 10]), np.arange(4, 16)
     bounds = place_costs(sums, places, 25, across, (4, 15), window)
