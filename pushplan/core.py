@@ -8,14 +8,35 @@ from pathlib import Path
 from pushplan.errors import PushplanError
 
 try:
-    from pushplan._core import COMPILER, SOURCES, gtsp
+    from pushplan._core import (
+        COMPILER,
+        SOURCES,
+        envs,
+        geometry,
+        gtsp,
+        learned,
+        observation,
+        scenarios,
+        search,
+    )
 except ImportError as error:
     raise PushplanError(
         f"the compiled core of pushplan is not built for this tree ({error}): "
         f"run pip install -e . in it"
     ) from error
 
-__all__ = ["COMPILER", "SOURCES", "gtsp", "is_stale"]
+__all__ = [
+    "COMPILER",
+    "SOURCES",
+    "envs",
+    "geometry",
+    "gtsp",
+    "is_stale",
+    "learned",
+    "observation",
+    "scenarios",
+    "search",
+]
 
 
 def is_stale() -> bool:

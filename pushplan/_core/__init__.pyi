@@ -19,6 +19,6 @@ from pushplan._core import (
 )
 
 
-SOURCES: str = '49c600bd1edc'
+SOURCES: str = '19069d2f3b3e'
 
 COMPILER: str = 'GNU 12.2.0'
