@@ -19,6 +19,6 @@ from pushplan._core import (
 )
 
 
-SOURCES: str = 'b42d26c5c55c'
+SOURCES: str = '1a7ba3be2d43'
 
 COMPILER: str = 'GNU 12.2.0'

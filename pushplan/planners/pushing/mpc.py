@@ -12,9 +12,8 @@ from pushplan.control.episode_clock import EpisodeClock
 from pushplan.control.limits import driven_twist
 from pushplan.control.mpc.horizon import Horizon, make_horizon, solve_rounds, track_of
 from pushplan.control.mpc.quadratic_program import ProgramSolver
-from pushplan.core import geometry
 from pushplan.core import pushing as core
-from pushplan.geometry.obstacles import obstacles_of
+from pushplan.geometry.obstacles import core_obstacles
 from pushplan.planners.pushing.bumper import faces_of
 from pushplan.planners.pushing.parameters import PushingConfig
 from pushplan.planners.pushing.push_model import PushModel, PushState
@@ -152,8 +151,7 @@ class PushingMpc:
         if not tracker.observe(self._track, pose, box, time, held):
             return tracker.send(0.0, 0.0, time, held)
         solved = self._solve(tracker)
-        walls = geometry.Obstacles(*obstacles_of(world.static))
-        return tracker.drive(walls, solved, time, held)
+        return tracker.drive(core_obstacles(world.static), solved, time, held)
 
     def _solve(self, tracker: core.PushTracker) -> bool:
         assert self._horizon is not None

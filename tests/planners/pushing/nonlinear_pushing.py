@@ -12,9 +12,8 @@ import casadi
 import numpy as np
 
 from pushplan.control.mpc.horizon import track_of
-from pushplan.core import geometry
 from pushplan.core import pushing as core
-from pushplan.geometry.obstacles import obstacles_of
+from pushplan.geometry.obstacles import core_obstacles
 from pushplan.planners.pushing.mpc import _SAFE_FRACTION, _WEIGHTS, PushingMpc, groups_of
 from pushplan.world import RobotModel, World
 from pushplan.world.checks import FloatArray, IntArray
@@ -54,8 +53,7 @@ class NonlinearPushingMpc(PushingMpc):
         if not self._solve(tracker):
             nominal[:] = [world.robot.max_speed, 0.0]
         nominal[:] = self._refined(world.robot, nominal.copy())
-        obstacles = geometry.Obstacles(*obstacles_of(world.static))
-        return tracker.drive(obstacles, True, world.time, held)
+        return tracker.drive(core_obstacles(world.static), True, world.time, held)
 
     def _refined(self, robot: RobotModel, commands: FloatArray) -> FloatArray:
         """The best of commands (M, 2) and of what IPOPT makes of them."""
