@@ -8,14 +8,47 @@ from pathlib import Path
 from pushplan.errors import PushplanError
 
 try:
-    from pushplan._core import COMPILER, SOURCES, gtsp
+    from pushplan._core import (
+        COMPILER,
+        SOURCES,
+        control,
+        envs,
+        geometry,
+        gtsp,
+        interaction,
+        learned,
+        motion,
+        observation,
+        planners,
+        pushing,
+        rearrangement,
+        scenarios,
+        search,
+    )
 except ImportError as error:
     raise PushplanError(
         f"the compiled core of pushplan is not built for this tree ({error}): "
         f"run pip install -e . in it"
     ) from error
 
-__all__ = ["COMPILER", "SOURCES", "gtsp", "is_stale"]
+__all__ = [
+    "COMPILER",
+    "SOURCES",
+    "control",
+    "envs",
+    "geometry",
+    "gtsp",
+    "interaction",
+    "is_stale",
+    "learned",
+    "motion",
+    "observation",
+    "planners",
+    "pushing",
+    "rearrangement",
+    "scenarios",
+    "search",
+]
 
 
 def is_stale() -> bool:

@@ -14,9 +14,9 @@ import time
 import numpy as np
 
 from benchmarks.reporting import command_line
+from pushplan.core import motion as core
 from pushplan.envs import RolloutInteraction, make
 from pushplan.interaction import Interaction, QuasiStatic
-from pushplan.motion.dubins import along_arc
 from pushplan.scenarios import Scenario
 from pushplan.world import World
 from pushplan.world.checks import FloatArray
@@ -32,7 +32,7 @@ def random_drive(world: World, rng: np.random.Generator) -> FloatArray:
     bend = 0.0
     for i in range(1, STEPS):
         bend = float(np.clip(bend + rng.normal(0.0, 0.15), -0.6, 0.6))
-        along_arc(path[i - 1], SPACING, bend, path[i])
+        core.along_arc(path[i - 1], SPACING, bend, path[i])
     return path
 
 

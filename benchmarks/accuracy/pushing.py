@@ -37,7 +37,6 @@ from pushplan.planners.pushing import (
     PushPath,
     PushState,
     spread_of,
-    warm_up,
 )
 from pushplan.planners.rearrangement.push_controllers import GeometricPusher
 from pushplan.planners.rearrangement.push_scene import PushScene
@@ -311,7 +310,6 @@ def main() -> None:
     parser.add_argument("--only", choices=("time", "disturbed"))
     parser.add_argument("--setting", default="", help="only settings whose names hold this text")
     options = parser.parse_args()
-    warm_up()
     chosen = [setting for setting in settings() if options.setting in setting.name]
     if options.only != "time":
         disturbed(chosen, options.seeds)

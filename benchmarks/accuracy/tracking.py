@@ -22,8 +22,8 @@ import numpy as np
 
 from benchmarks.reporting import command_line
 from pushplan.control import MpcConfig, MpcTracker, PathFollower, PurePursuit
+from pushplan.core import motion as core
 from pushplan.envs import PushEnv
-from pushplan.motion.dubins import along_arc
 from pushplan.planners import KinodynamicRRT, MaxIterations, ShortestPath
 from pushplan.world import Controller, Drive, Plan, RobotModel, StaticMap, World
 from pushplan.world.checks import FloatArray
@@ -43,7 +43,7 @@ def arcs(world: World, pieces: list[tuple[float, float]]) -> Plan:
         steps = max(1, round(length / 0.15))
         for _ in range(steps):
             here = np.empty(3)
-            along_arc(poses[-1], length * size / steps, bend / size, here)
+            core.along_arc(poses[-1], length * size / steps, bend / size, here)
             poses.append(here)
             bends.append(bend / size)
             lengths.append(lengths[-1] + length * size / steps)

@@ -5,6 +5,7 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 
+#include <array>
 #include <span>
 #include <vector>
 
@@ -39,6 +40,11 @@ auto view(const nb::ndarray<T, nb::shape<Extents...>, nb::c_contig, nb::device::
   }
 }
 
+template <class T, nb::ssize_t... Extents>
+auto view(const nb::ndarray<nb::numpy, T, nb::shape<Extents...>, nb::c_contig>& made) {
+  return view(nb::ndarray<T, nb::shape<Extents...>, nb::c_contig, nb::device::cpu>(made));
+}
+
 using Poses = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using PosesOut = nb::ndarray<double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using Points = nb::ndarray<const double, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>;
@@ -64,6 +70,20 @@ auto copied(std::span<const T> values) {
   auto* owned = new std::vector<T>(values.begin(), values.end());
   nb::capsule owner(owned, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
   return nb::ndarray<nb::numpy, T, nb::ndim<1>>(owned->data(), {owned->size()}, owner);
+}
+
+/// An array that a binding makes and returns.
+template <class T, std::size_t Rank>
+using NewArray = nb::ndarray<nb::numpy, T, nb::ndim<Rank>, nb::c_contig>;
+
+/// A new NumPy array of zeros.
+template <class T, std::size_t Rank>
+NewArray<T, Rank> zeros(const std::array<std::size_t, Rank>& shape) {
+  std::size_t size = 1;
+  for (const std::size_t extent : shape) size *= extent;
+  auto* numbers = new T[size]();
+  nb::capsule owner(numbers, [](void* p) noexcept { delete[] static_cast<T*>(p); });
+  return NewArray<T, Rank>(numbers, Rank, shape.data(), owner);
 }
 
 /// How a property returns an array that owns its numbers.

@@ -1,4 +1,8 @@
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
+
 #include <algorithm>
+#include <optional>
 
 #include "arrays.hpp"
 #include "pushplan/control/mpc/tracker.hpp"
@@ -10,11 +14,8 @@ using namespace nb::literals;
 
 namespace {
 
-/// A command that is known without a program is written, and False returned.
-bool written(const std::optional<mpc::Twist>& command, const FloatsOut<1>& out) {
-  if (command) *reinterpret_cast<mpc::Twist*>(out.data()) = *command;
-  return !command;
-}
+/// A command as Python has it: speed [m/s], turn rate [rad/s].
+std::pair<double, double> numbers(const mpc::Twist& twist) { return {twist.v, twist.w}; }
 
 void bind_horizon(nb::module_& module) {
   nb::class_<mpc::CommandLimits>(module, "CommandLimits")
@@ -68,11 +69,10 @@ void bind_horizon(nb::module_& module) {
           nb::keep_alive<1, 19>())
       .def(
           "send",
-          [](mpc::Horizon& self, double v, double w, double held, bool ramps,
-             const FloatsOut<1>& out) {
-            *reinterpret_cast<mpc::Twist*>(out.data()) = self.send({v, w}, held, ramps);
+          [](mpc::Horizon& self, double v, double w, double held, bool ramps) {
+            return numbers(self.send({v, w}, held, ramps));
           },
-          "v"_a, "w"_a, "held"_a, "ramps"_a, "out"_a.noconvert())
+          "v"_a, "w"_a, "held"_a, "ramps"_a)
       .def("remember", &mpc::Horizon::remember, "time"_a, "over"_a);
 }
 
@@ -102,14 +102,6 @@ void bind_path(nb::module_& module) {
             return nb::make_tuple(offset, error, heading, curvature);
           },
           "x"_a, "y"_a, "theta"_a, "index"_a, "fraction"_a);
-  module.def(
-      "arc",
-      [](double x, double y, double theta, double v, double w, double dt, const FloatsOut<1>& out) {
-        const mpc::ArcMotion motion = mpc::arc({x, y, theta}, {v, w}, dt);
-        std::copy_n(reinterpret_cast<const double*>(&motion), sizeof(motion) / sizeof(double),
-                    out.data());
-      },
-      "x"_a, "y"_a, "theta"_a, "v"_a, "w"_a, "dt"_a, "out"_a.noconvert());
 }
 
 void bind_tracker(nb::module_& module) {
@@ -148,29 +140,22 @@ void bind_tracker(nb::module_& module) {
       .def(
           "begin_step",
           [](mpc::Tracker& self, const mpc::ReferencePath& track, const OnePose& at, double time,
-             double held, const FloatsOut<1>& out) {
-            return written(self.begin_step(track, pose(at), time, held), out);
+             double held) -> std::optional<std::pair<double, double>> {
+            const auto known = self.begin_step(track, pose(at), time, held);
+            if (!known) return std::nullopt;
+            return numbers(*known);
           },
-          "track"_a, "pose"_a.noconvert(), "time"_a, "held"_a, "out"_a.noconvert(), ReleaseGil())
+          "track"_a, "pose"_a.noconvert(), "time"_a, "held"_a, ReleaseGil(),
+          "Put up the program for where the robot is; the command where it is known without one.")
       .def("assemble_step", &mpc::Tracker::assemble_step, "track"_a, ReleaseGil())
       .def(
           "finish_step",
           [](mpc::Tracker& self, const mpc::ReferencePath& track, const OnePose& at, double time,
-             double held, bool solved, const FloatsOut<1>& out) {
-            *reinterpret_cast<mpc::Twist*>(out.data()) =
-                self.finish_step(track, pose(at), time, held, solved);
+             double held, bool solved) {
+            return numbers(self.finish_step(track, pose(at), time, held, solved));
           },
-          "track"_a, "pose"_a.noconvert(), "time"_a, "held"_a, "solved"_a, "out"_a.noconvert(),
-          ReleaseGil())
-      .def_prop_ro("place", &mpc::Tracker::place)
-      .def_prop_ro(
-          "pose",
-          [](const mpc::Tracker& self) {
-            const Pose& at = self.pose();
-            const double numbers[]{at.x, at.y, at.theta};
-            return copied(std::span<const double>(numbers));
-          },
-          kOwned);
+          "track"_a, "pose"_a.noconvert(), "time"_a, "held"_a, "solved"_a, ReleaseGil(),
+          "The command: of the solution, or what is nearest to it without one.");
 }
 
 void bind_waiting(nb::module_& module) {

@@ -10,20 +10,23 @@ using namespace nb::literals;
 void bind_envs(nb::module_& module) {
   module.def(
       "slow_down",
-      [](const Floats<2>& velocities, const Floats<1>& keeps, const Floats<2>& drag, double h,
-         const FloatsOut<2>& out) {
+      [](const Poses& velocities, const Floats<1>& keeps, const Floats<2>& drag, double h) {
+        const auto kept = zeros<double, 2>({velocities.shape(0), 3});
         slow_down(rows_as<const Twist>(velocities), view(keeps), rows_as<const BodyDrag>(drag), h,
-                  rows_as<Twist>(out));
+                  rows_as<Twist>(kept));
+        return kept;
       },
-      "velocities"_a.noconvert(), "keeps"_a.noconvert(), "drag"_a.noconvert(), "h"_a,
-      "out"_a.noconvert(), ReleaseGil());
+      "velocities"_a.noconvert(), "keeps"_a.noconvert(), "drag"_a.noconvert(), "h"_a);
 
   module.def(
       "flow_shapes",
-      [](const Points& vertices, const Integers<1>& offsets, const FloatsOut<2>& out) {
-        flow_shapes({points(vertices), view(offsets)}, rows_as<FlowShape>(out));
+      [](const Points& vertices, const Integers<1>& offsets) {
+        const auto shapes = zeros<double, 2>({offsets.shape(0) - 1, 4});
+        flow_shapes({points(vertices), view(offsets)}, rows_as<FlowShape>(shapes));
+        return shapes;
       },
-      "vertices"_a.noconvert(), "offsets"_a.noconvert(), "out"_a.noconvert(), ReleaseGil());
+      "vertices"_a.noconvert(), "offsets"_a.noconvert(),
+      "(K, 4) mean width [m], area [m^2], two integrals of rotation [m^4, m^5] of convex bodies.");
 
   nb::class_<Reach>(module, "Reach", "Objects that a step of the robot can affect.")
       .def(
@@ -41,34 +44,35 @@ void bind_envs(nb::module_& module) {
       .def(
           "within",
           [](Reach& self, const OnePose& robot, double reach, const Poses& objects,
-             const Floats<1>& speeds, const Array<bool, 1>& found) {
+             const Floats<1>& speeds) {
+            const auto found = zeros<bool, 1>({objects.shape(0)});
             self.within(pose(robot), reach, poses(objects), view(speeds), view(found));
+            return found;
           },
-          "robot"_a.noconvert(), "reach"_a, "poses"_a.noconvert(), "speeds"_a.noconvert(),
-          "found"_a.noconvert(), ReleaseGil())
+          "robot"_a.noconvert(), "reach"_a, "poses"_a.noconvert(), "speeds"_a.noconvert())
       .def(
           "clear_time",
           [](Reach& self, const OnePose& robot, double course, double linear, double angular,
-             bool holds, double limit, double margin, const Poses& objects, const Points& cores,
-             const Integers<1>& core_offsets, const Floats<1>& core_radii) {
+             bool holds, double limit, double margin, const Poses& objects,
+             const Obstacles& obstacles) {
             return self.clear_time(pose(robot), {course, linear, angular, holds}, limit, margin,
-                                   poses(objects),
-                                   {{points(cores), view(core_offsets)}, view(core_radii), {}});
+                                   poses(objects), obstacles);
           },
           "robot"_a.noconvert(), "course"_a, "linear"_a, "angular"_a, "holds"_a, "limit"_a,
-          "margin"_a, "poses"_a.noconvert(), "cores"_a.noconvert(), "core_offsets"_a.noconvert(),
-          "core_radii"_a.noconvert(), ReleaseGil())
+          "margin"_a, "poses"_a.noconvert(), "obstacles"_a, ReleaseGil(),
+          "Time [s] for which a robot that drives an arc certainly touches nothing.")
       .def(
           "struck",
           [](Reach& self, const Array<const bool, 1>& loaded, const Floats<3>& paths,
-             const Poses& before, const Array<bool, 1>& found) {
+             const Poses& before) {
+            const auto found = zeros<bool, 1>({before.shape(0)});
             const ArrayView<const Pose, 2> rows(
                 reinterpret_cast<const Pose*>(paths.data()),
                 {static_cast<Index>(paths.shape(0)), static_cast<Index>(paths.shape(1))});
             self.struck(view(loaded), rows, poses(before), view(found));
+            return found;
           },
-          "loaded"_a.noconvert(), "paths"_a.noconvert(), "before"_a.noconvert(),
-          "found"_a.noconvert(), ReleaseGil());
+          "loaded"_a.noconvert(), "paths"_a.noconvert(), "before"_a.noconvert());
 
   module.def(
       "arc_pose",

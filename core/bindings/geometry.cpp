@@ -21,8 +21,10 @@ using namespace nb::literals;
 
 namespace {
 
-using Flags = nb::ndarray<bool, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using BoxArray = nb::ndarray<const double, nb::shape<4>, nb::c_contig, nb::device::cpu>;
+using OnePoint = nb::ndarray<const double, nb::shape<2>, nb::c_contig, nb::device::cpu>;
+
+Vec2 point(const OnePoint& array) { return {array.data()[0], array.data()[1]}; }
 
 Box box(const BoxArray& array) {
   return {array.data()[0], array.data()[1], array.data()[2], array.data()[3]};
@@ -131,18 +133,25 @@ void bind_obstacles(nb::module_& module) {
           "px"_a, "py"_a, "qx"_a, "qy"_a, "margin"_a)
       .def(
           "free_points",
-          [](const Obstacles& self, const Points& places, const BoxArray& bounds, double gap,
-             const Flags& keep) {
-            free_points(points(places), self, box(bounds), gap, {keep.data(), keep.shape(0)});
+          [](const Obstacles& self, const Points& places, const BoxArray& bounds, double gap) {
+            const auto free = zeros<bool, 1>({places.shape(0)});
+            const auto flags = view(free);
+            {
+              nb::gil_scoped_release release;
+              free_points(points(places), self, box(bounds), gap, flags);
+            }
+            return free;
           },
-          "points"_a.noconvert(), "box"_a.noconvert(), "gap"_a, "keep"_a.noconvert(), ReleaseGil())
+          "points"_a.noconvert(), "box"_a.noconvert(), "gap"_a,
+          "Flags of points that lie in the box (4,) and the gap or more off every obstacle.")
       .def(
           "fill_clearance",
-          [](const Obstacles& self, const FloatsOut<2>& out, Index first, Index last, double x,
-             double y, double step) {
-            fill_clearance(view(out), first, last, {{x, y}, step}, self);
+          [](const Obstacles& self, const FloatsOut<2>& out, Index first, Index last,
+             const OnePoint& origin, double step) {
+            fill_clearance(view(out), first, last, {point(origin), step}, self);
           },
-          "out"_a.noconvert(), "first"_a, "last"_a, "x"_a, "y"_a, "step"_a, ReleaseGil());
+          "out"_a.noconvert(), "first"_a, "last"_a, "origin"_a.noconvert(), "step"_a,
+          ReleaseGil());
   module.def(
       "core_distance",
       [](double x, double y, const Points& core) { return core_distance({x, y}, points(core)); },
@@ -201,11 +210,16 @@ void bind_visibility(nb::module_& module) {
           "x"_a, "y"_a)
       .def(
           "goal_legs",
-          [](const GoalScene& self, const Points& places, const FloatsOut<2>& out) {
-            auto* leg = reinterpret_cast<GoalLeg*>(out.data());
-            for (const Vec2 p : points(places)) *leg++ = goal_leg(p, self);
+          [](const GoalScene& self, const Points& places) {
+            const auto legs = zeros<double, 2>({places.shape(0), 3});
+            {
+              nb::gil_scoped_release release;
+              auto* leg = reinterpret_cast<GoalLeg*>(legs.data());
+              for (const Vec2 p : points(places)) *leg++ = goal_leg(p, self);
+            }
+            return legs;
           },
-          "points"_a.noconvert(), "out"_a.noconvert(), ReleaseGil())
+          "points"_a.noconvert(), "(N, 3) `goal_leg` of each point.")
       .def(
           "node_leg",
           [](const GoalScene& self, double x, double y, double limit, Index hint,
@@ -217,11 +231,12 @@ void bind_visibility(nb::module_& module) {
           "x"_a, "y"_a, "limit"_a, "hint"_a, "tangent_only"_a, "nodes"_a, ReleaseGil())
       .def(
           "fill_distances",
-          [](const GoalScene& self, const FloatsOut<2>& out, double x, double y, double step,
+          [](const GoalScene& self, const FloatsOut<2>& out, const OnePoint& origin, double step,
              const Nodes& nodes, double sliver) {
-            fill_distances(view(out), {{x, y}, step}, nodes, self, sliver);
+            fill_distances(view(out), {point(origin), step}, nodes, self, sliver);
           },
-          "out"_a.noconvert(), "x"_a, "y"_a, "step"_a, "nodes"_a, "sliver"_a, ReleaseGil());
+          "out"_a.noconvert(), "origin"_a.noconvert(), "step"_a, "nodes"_a, "sliver"_a,
+          ReleaseGil());
   module.def(
       "visible_pairs",
       [](const Bends& bends, const Obstacles& obstacles, double gap) {
@@ -300,12 +315,12 @@ void bind_path_search(nb::module_& module) {
   nb::class_<VisibilitySearch>(module, "VisibilitySearch", "Lazy A* over the visibility graph.")
       .def(
           "__init__",
-          [](VisibilitySearch* self, double x, double y, const Corners& corners,
+          [](VisibilitySearch* self, const OnePoint& start, const Corners& corners,
              const GoalScene& scene, const ObstacleGrid& grid, double sliver) {
-            new (self) VisibilitySearch({x, y}, corners, scene, grid, sliver);
+            new (self) VisibilitySearch(point(start), corners, scene, grid, sliver);
           },
-          "x"_a, "y"_a, "corners"_a, "scene"_a, "grid"_a, "sliver"_a, nb::keep_alive<1, 4>(),
-          nb::keep_alive<1, 5>(), nb::keep_alive<1, 6>(), ReleaseGil())
+          "start"_a.noconvert(), "corners"_a, "scene"_a, "grid"_a, "sliver"_a,
+          nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>(), nb::keep_alive<1, 5>(), ReleaseGil())
       .def("run", &VisibilitySearch::run, "budget"_a, ReleaseGil())
       .def_prop_ro("end", &VisibilitySearch::end)
       .def_prop_ro("lines_tested", &VisibilitySearch::lines_tested)
@@ -323,12 +338,12 @@ void bind_shadows(nb::module_& module) {
       "value"_a, ReleaseGil());
   module.def(
       "fill_bend_distances",
-      [](const Array<float, 3>& table, double x, double y, double step, const Bends& bends,
+      [](const Array<float, 3>& table, const OnePoint& origin, double step, const Bends& bends,
          const Floats<2>& between, const Points& corners, const Integers<1>& offsets, double gap) {
-        fill_bend_distances(view(table), {{x, y}, step}, bends, view(between),
+        fill_bend_distances(view(table), {point(origin), step}, bends, view(between),
                             {points(corners), view(offsets)}, gap);
       },
-      "table"_a.noconvert(), "x"_a, "y"_a, "step"_a, "bends"_a, "between"_a.noconvert(),
+      "table"_a.noconvert(), "origin"_a.noconvert(), "step"_a, "bends"_a, "between"_a.noconvert(),
       "corners"_a.noconvert(), "offsets"_a.noconvert(), "gap"_a, ReleaseGil());
   module.def(
       "bends_in_sight",

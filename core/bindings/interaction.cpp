@@ -178,14 +178,17 @@ void bind_interaction(nb::module_& module) {
       nb::class_<CalledInteraction>(module, "CalledInteraction", "Any model behind a C function.")
           .def(
               "__init__",
-              [](CalledInteraction* self, std::uintptr_t address, const Floats<1>& radii,
-                 const Floats<1>& inverse_masses) {
-                new (self) CalledInteraction(reinterpret_cast<CalledInteraction::Advance>(address),
-                                             nullptr, view(radii), view(inverse_masses));
+              [](CalledInteraction* self, std::uintptr_t function, std::uintptr_t context,
+                 const Floats<1>& radii, const Floats<1>& inverse_masses, const nb::object&) {
+                new (self) CalledInteraction(
+                    reinterpret_cast<CalledInteraction::Advance>(function),
+                    reinterpret_cast<void*>(context), view(radii), view(inverse_masses));
               },
-              "address"_a, "radii"_a.noconvert(), "inverse_masses"_a.noconvert(),
-              nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>(),
-              "The function at `address` is a `CalledInteraction::Advance` and outlives the model."));
+              "function"_a, "context"_a, "radii"_a.noconvert(), "inverse_masses"_a.noconvert(),
+              "owner"_a = nb::none(), nb::keep_alive<1, 4>(), nb::keep_alive<1, 5>(),
+              nb::keep_alive<1, 6>(),
+              "Addresses of a `CalledInteraction::Advance` and of what it is given as its context; "
+              "`owner` is kept alive for them."));
 
   bind_portions(module);
 }

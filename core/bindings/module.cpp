@@ -1,7 +1,11 @@
 #include "arrays.hpp"
 
+namespace nb = nanobind;
+
 NB_MODULE(_core, module) {
   module.doc() = "The compiled core of pushplan (C++, see core/). Arguments are not checked.";
+  // caches of Python hold shapes until the interpreter ends: no leak, and nothing to print
+  nb::set_leak_warnings(false);
   module.attr("SOURCES") = PUSHPLAN_SOURCES;
   module.attr("COMPILER") = PUSHPLAN_COMPILER;
   // caches of Python modules hold objects of these types until the interpreter ends
@@ -11,6 +15,8 @@ NB_MODULE(_core, module) {
   pushplan::bindings::bind_geometry(geometry);
   auto interaction = module.def_submodule("interaction", "Models of what the robot pushes.");
   pushplan::bindings::bind_interaction(interaction);
+  auto search = module.def_submodule("search", "Shortest paths on graphs.");
+  pushplan::bindings::bind_search(search);
   auto motion = module.def_submodule("motion", "Arcs, shortcuts and state lattices.");
   pushplan::bindings::bind_motion(motion);
   pushplan::bindings::bind_motion_paths(motion);
@@ -32,6 +38,4 @@ NB_MODULE(_core, module) {
   pushplan::bindings::bind_rearrangement(rearrangement);
   auto scenarios = module.def_submodule("scenarios", "Steps of the ice generator.");
   pushplan::bindings::bind_scenarios(scenarios);
-  auto search = module.def_submodule("search", "Shortest paths on graphs.");
-  pushplan::bindings::bind_search(search);
 }

@@ -258,9 +258,7 @@ void bind_lattice(nb::module_& module) {
       .def("restart", &LatticeSearch::restart, "lattice"_a, nb::keep_alive<1, 2>())
       .def("start", &LatticeSearch::start, "node"_a, "cost"_a = 0.0, "bound"_a = 0.0,
            "edge"_a = -1)
-      .def(
-          "run", [](LatticeSearch& self, Index budget) { return static_cast<int>(self.run(budget)); },
-          "budget"_a, ReleaseGil(), "0: no path exists; 1: the goal was reached; 2: paused.")
+      .def("run", &LatticeSearch::run, "budget"_a, ReleaseGil())
       .def_prop_ro("goal", &LatticeSearch::goal)
       .def_prop_ro("cost", &LatticeSearch::cost)
       .def_prop_ro("generated", &LatticeSearch::generated)

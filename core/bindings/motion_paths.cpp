@@ -26,7 +26,8 @@ void bind_collision(nb::module_& module) {
             new (self) Footprint{{points(vertices), view(offsets)}, radius};
           },
           "vertices"_a.noconvert(), "offsets"_a.noconvert(), "radius"_a, nb::keep_alive<1, 2>(),
-          nb::keep_alive<1, 3>());
+          nb::keep_alive<1, 3>())
+      .def_ro("radius", &Footprint::radius);
   nb::class_<ConvexObstacles>(module, "ConvexObstacles", "Convex polygons in groups of neighbours.")
       .def(
           "__init__",
@@ -172,6 +173,10 @@ void bind_ways_out(nb::module_& module) {
       },
       "start"_a.noconvert(), "steps"_a.noconvert(), "body"_a, "grown"_a, "among"_a, "size"_a,
       kOwned);
+  nb::enum_<RoomExploration::Outcome>(module, "RoomOutcome", "What an exploration has found out.")
+      .value("AWAY", RoomExploration::Outcome::kAway)
+      .value("CLOSED", RoomExploration::Outcome::kClosed)
+      .value("PAUSED", RoomExploration::Outcome::kPaused);
   nb::class_<OwnRoomExploration>(module, "RoomExploration",
                                  "A search for a way to get away, in batches.")
       .def(
@@ -191,11 +196,8 @@ void bind_ways_out(nb::module_& module) {
           "reach"_a, "clearance"_a, "breadth"_a, "start"_a.noconvert(), "side"_a, "turn"_a,
           "half"_a, "headings"_a, "capacity"_a, nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>())
       .def(
-          "run",
-          [](OwnRoomExploration& self, Index upto) {
-            return static_cast<int>(self.search.run(upto));
-          },
-          "upto"_a, ReleaseGil(), "0: got away; 1: no way; 2: paused.")
+          "run", [](OwnRoomExploration& self, Index upto) { return self.search.run(upto); },
+          "upto"_a, ReleaseGil())
       .def_prop_ro(
           "arcs",
           [](const OwnRoomExploration& self) {

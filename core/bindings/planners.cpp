@@ -1,5 +1,6 @@
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/pair.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/unique_ptr.h>
 
 #include <array>
@@ -54,6 +55,11 @@ void bind_cost_to_go(nb::module_& module) {
           },
           "values"_a.noconvert(), "floor"_a.noconvert(), "x"_a, "y"_a, "cell"_a,
           nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>())
+      .def_prop_ro("shape",
+                   [](const CostToGo& self) {
+                     return std::tuple(self.rows(), self.columns(), self.headings());
+                   })
+      .def_prop_ro("cell", [](const CostToGo& self) { return self.cells.step; })
       .def(
           "length_to_go",
           [](const CostToGo& self, double x, double y, double theta) {
@@ -167,9 +173,7 @@ void bind_push_aware(nb::module_& module) {
           },
           "node"_a, kOwned);
   nb::class_<PushSearch>(module, "PushSearch", "A best-first search over arcs that push.")
-      .def(
-          "run", [](PushSearch& self, Index budget) { return static_cast<int>(self.run(budget)); },
-          "budget"_a, ReleaseGil(), "0: no path exists; 1: the goal was reached; 2: paused.")
+      .def("run", &PushSearch::run, "budget"_a, ReleaseGil())
       .def_prop_ro("goal", [](const PushSearch& self) { return self.goal() >> 1; },
                    "The node of the tree in the goal, -1 before it is reached.");
 }

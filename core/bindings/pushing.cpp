@@ -1,6 +1,10 @@
 #include <nanobind/stl/pair.h>
 
+#include <nanobind/stl/vector.h>
+
 #include <algorithm>
+#include <utility>
+#include <vector>
 
 #include "arrays.hpp"
 #include "pushplan/planners/pushing/push_tracker.hpp"
@@ -44,6 +48,14 @@ void bind_contact(nb::module_& module) {
           },
           "front"_a, "half"_a, "curvature"_a, "depth"_a, "low"_a, "high"_a, "spread"_a,
           "friction"_a)
+      .def_ro("front", &BoxContact::front, "X of the bumper in its middle, from the axle [m].")
+      .def_ro("half", &BoxContact::half, "Half the bumper's width [m].")
+      .def_ro("curvature", &BoxContact::curvature, "Curvature of the bumper's front [1/m].")
+      .def_ro("depth", &BoxContact::depth, "From the pushed face to the box's centre [m].")
+      .def_ro("low", &BoxContact::low, "Right end of the face from the centre [m], negative.")
+      .def_ro("high", &BoxContact::high, "Left end of the face [m].")
+      .def_ro("spread", &BoxContact::spread, "Greatest torque over force of the ground [m].")
+      .def_ro("friction", &BoxContact::friction, "Coefficient between bumper and box.")
       .def(
           "line",
           [](const BoxContact& self, double offset) {
@@ -92,18 +104,18 @@ void bind_contact(nb::module_& module) {
           "states"_a.noconvert(), "motions"_a.noconvert(), ReleaseGil())
       .def(
           "observe",
-          [](const BoxContact& self, double normal, const OnePose& robot, const OnePose& box,
-             const FloatsOut<1>& out) {
-            *reinterpret_cast<PushState*>(out.data()) =
-                observe(self, normal, pose(robot), pose(box));
+          [](const BoxContact& self, double normal, const OnePose& robot, const OnePose& box) {
+            return copied_state(observe(self, normal, pose(robot), pose(box)));
           },
-          "normal"_a, "robot"_a.noconvert(), "box"_a.noconvert(), "out"_a.noconvert())
+          "normal"_a, "robot"_a.noconvert(), "box"_a.noconvert(), kOwned)
       .def(
           "box_pose",
-          [](const BoxContact& self, const OneState& state, const FloatsOut<1>& out) {
-            *reinterpret_cast<Pose*>(out.data()) = box_pose(self, state_of(state));
+          [](const BoxContact& self, const OneState& state) {
+            const Pose box = box_pose(self, state_of(state));
+            const double numbers[]{box.x, box.y, box.theta};
+            return copied(std::span<const double>(numbers));
           },
-          "state"_a.noconvert(), "out"_a.noconvert());
+          "state"_a.noconvert(), kOwned);
 }
 
 void bind_clearance(nb::module_& module) {
@@ -182,26 +194,33 @@ void bind_problem(nb::module_& module) {
           ReleaseGil());
 }
 
+/// Faces with contacts of their own.
+struct ListedFaces {
+  std::vector<BoxContact> contacts;
+  Faces faces;
+};
+
 void bind_tracker(nb::module_& module) {
-  nb::class_<Faces>(module, "Faces", "The sides of a box on one bumper.")
+  nb::class_<ListedFaces>(module, "Faces", "The sides of a box on one bumper.")
       .def(
           "__init__",
-          [](Faces* self, const Floats<2>& scores, const Floats<2>& contacts,
+          [](ListedFaces* self, const Floats<2>& scores, std::vector<BoxContact> contacts,
              const Floats<1>& normals, const Floats<1>& curvatures) {
-            new (self) Faces{rows_as<const FaceScore>(scores), rows_as<const BoxContact>(contacts),
-                             view(normals), view(curvatures)};
+            new (self) ListedFaces{std::move(contacts), {}};
+            self->faces = {rows_as<const FaceScore>(scores), self->contacts, view(normals),
+                           view(curvatures)};
           },
-          "scores"_a.noconvert(), "contacts"_a.noconvert(), "normals"_a.noconvert(),
-          "curvatures"_a.noconvert(), nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(),
-          nb::keep_alive<1, 4>(), nb::keep_alive<1, 5>());
+          "scores"_a.noconvert(), "contacts"_a, "normals"_a.noconvert(),
+          "curvatures"_a.noconvert(), nb::keep_alive<1, 2>(), nb::keep_alive<1, 4>(),
+          nb::keep_alive<1, 5>());
   nb::class_<PushTracker>(module, "PushTracker", "Pushes one box along one path.")
       .def(
           "__init__",
           [](PushTracker* self, const mpc::Horizon& horizon, const PushWeights& weights,
-             const Faces& faces, const Clearance& clearance, const Integers<1>& groups,
+             const ListedFaces& listed, const Clearance& clearance, const Integers<1>& groups,
              double reach, double delay, double gain) {
-            new (self) PushTracker(horizon, {weights, view(groups), reach, delay, gain}, faces,
-                                   clearance);
+            new (self) PushTracker(horizon, {weights, view(groups), reach, delay, gain},
+                                   listed.faces, clearance);
           },
           "horizon"_a, "weights"_a, "faces"_a, "clearance"_a, "groups"_a.noconvert(), "reach"_a,
           "delay"_a, "gain"_a, nb::keep_alive<1, 2>(), nb::keep_alive<1, 4>(),
@@ -217,18 +236,19 @@ void bind_tracker(nb::module_& module) {
       .def("assemble", &PushTracker::assemble, "track"_a, "held"_a, ReleaseGil())
       .def(
           "drive",
-          [](PushTracker& self, const Obstacles& obstacles, bool solved, double time, double held,
-             const FloatsOut<1>& out) {
-            *reinterpret_cast<Twist*>(out.data()) = self.drive(obstacles, solved, time, held);
+          [](PushTracker& self, const Obstacles& obstacles, bool solved, double time,
+             double held) {
+            const Twist twist = self.drive(obstacles, solved, time, held);
+            return std::pair{twist.v, twist.w};
           },
-          "obstacles"_a, "solved"_a, "time"_a, "held"_a, "out"_a.noconvert(), ReleaseGil())
+          "obstacles"_a, "solved"_a, "time"_a, "held"_a, ReleaseGil())
       .def(
           "send",
-          [](PushTracker& self, double v, double w, double time, double held,
-             const FloatsOut<1>& out) {
-            *reinterpret_cast<Twist*>(out.data()) = self.send({v, w}, time, held);
+          [](PushTracker& self, double v, double w, double time, double held) {
+            const Twist twist = self.send({v, w}, time, held);
+            return std::pair{twist.v, twist.w};
           },
-          "v"_a, "w"_a, "time"_a, "held"_a, "out"_a.noconvert())
+          "v"_a, "w"_a, "time"_a, "held"_a)
       .def_prop_ro("face", &PushTracker::face)
       .def_prop_ro("along", &PushTracker::along)
       .def_prop_ro("lateral", &PushTracker::lateral)

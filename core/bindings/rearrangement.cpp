@@ -1,6 +1,12 @@
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/tuple.h>
 
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <tuple>
+#include <utility>
+
 #include "arrays.hpp"
 #include "pushplan/planners/rearrangement/controller.hpp"
 #include "pushplan/planners/rearrangement/cost_to_go.hpp"
@@ -19,16 +25,53 @@ using namespace pushplan::rearrangement;
 namespace {
 
 using Bools = Array<const bool, 1>;
+template <class T, std::size_t Rank>
+using Numpy = nb::ndarray<nb::numpy, T, nb::ndim<Rank>>;
 
 Index extent(const auto& array, std::size_t axis) { return static_cast<Index>(array.shape(axis)); }
 
-ArrayView<Pose, 2> pose_matrix(const FloatsOut<3>& array) {
-  return {reinterpret_cast<Pose*>(array.data()), {extent(array, 0), extent(array, 1)}};
-}
+/// Zeros to fill, which Python gets as an array of its own.
+template <class T, std::size_t Rank>
+class NewArray {
+ public:
+  using Shape = typename ArrayView<T, Rank>::Shape;
 
-ArrayView<Pose, 3> pose_matrices(const FloatsOut<4>& array) {
-  return {reinterpret_cast<Pose*>(array.data()),
-          {extent(array, 0), extent(array, 1), extent(array, 2)}};
+  explicit NewArray(const Shape& shape) : view_(nullptr, shape) {
+    numbers_ = std::make_unique<T[]>(static_cast<std::size_t>(view_.size()));
+    view_ = {numbers_.get(), shape};
+  }
+
+  ArrayView<T, Rank> view() const { return view_; }
+  std::span<T> numbers() const {
+    return {numbers_.get(), static_cast<std::size_t>(view_.size())};
+  }
+  /// The same as structures of such numbers.
+  template <class Struct>
+  Struct* as() const {
+    return reinterpret_cast<Struct*>(numbers_.get());
+  }
+
+  /// Gives the array, or the part of it that has only so many of its rows, to Python.
+  Numpy<T, Rank> give(Index rows = -1) {
+    std::array<std::size_t, Rank> shape;
+    for (std::size_t axis = 0; axis < Rank; ++axis) {
+      shape[axis] = static_cast<std::size_t>(view_.extent(axis));
+    }
+    if (rows >= 0) shape[0] = static_cast<std::size_t>(rows);
+    T* data = numbers_.release();
+    nb::capsule owner(data, [](void* p) noexcept { delete[] static_cast<T*>(p); });
+    return Numpy<T, Rank>(data, Rank, shape.data(), owner);
+  }
+
+ private:
+  std::unique_ptr<T[]> numbers_;
+  ArrayView<T, Rank> view_;
+};
+
+/// Calls a function that needs no Python while other threads may run some.
+void without_gil(const auto& call) {
+  nb::gil_scoped_release released;
+  call();
 }
 
 void bind_goal(nb::module_& module) {
@@ -44,132 +87,213 @@ void bind_goal(nb::module_& module) {
           nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>());
   module.def(
       "all_done",
-      [](const Poses& objects, const Bodies& bodies, const ObjectGoal& goal,
-         const Array<bool, 1>& out) {
-        GoalTest(bodies.objects, goal).all_done(poses(objects), view(out));
+      [](const Poses& objects, const Bodies& bodies, const ObjectGoal& goal) {
+        NewArray<bool, 1> done({extent(objects, 0)});
+        without_gil([&] {
+          GoalTest(bodies.objects, goal).all_done(poses(objects), done.numbers());
+        });
+        return done.give();
       },
-      "poses"_a.noconvert(), "bodies"_a, "goal"_a, "out"_a.noconvert(), ReleaseGil());
+      "poses"_a.noconvert(), "bodies"_a, "goal"_a, kOwned,
+      "(K,) whether each object is where it belongs.");
   module.def(
-      "fill_cost_to_go",
-      [](const Floats<2>& costs, const Integers<1>& delivers, Index objects,
-         const FloatsOut<2>& best, const IntegersOut<2>& following) {
-        fill_cost_to_go(view(costs), view(delivers), objects, {view(best), view(following)});
+      "cost_to_go",
+      [](const Floats<2>& costs, const Integers<1>& delivers, Index objects) {
+        const NewArray<double, 2>::Shape shape{Index{1} << objects, extent(costs, 0)};
+        NewArray<double, 2> best(shape);
+        NewArray<Index, 2> following(shape);
+        without_gil([&] {
+          fill_cost_to_go(view(costs), view(delivers), objects, {best.view(), following.view()});
+        });
+        return std::pair(best.give(), following.give());
       },
-      "costs"_a.noconvert(), "delivers"_a.noconvert(), "objects"_a, "best"_a.noconvert(),
-      "following"_a.noconvert(), ReleaseGil());
+      "costs"_a.noconvert(), "delivers"_a.noconvert(), "objects"_a,
+      "(2^objects, N + 1) cost of delivering the rest, and the push to follow or -1, by what is "
+      "delivered and the last push; N for none.");
+  module.attr("MAX_OBJECTS") = kMaxObjects;
+  module.attr("MAX_EXACT") = kMaxExact;
+  module.attr("REMOVED") = kRemoved;
+}
+
+/// A lattice with memory of its own.
+struct OwnedGrid {
+  std::unique_ptr<bool[]> blocked;
+  std::unique_ptr<bool[]> blocked_moves;
+  PoseGrid grid;
+};
+
+OwnedGrid make_grid(Vec2 origin, double step, Index rows, Index columns, CollisionChecker& checker) {
+  constexpr Index kHeadings = kHeadingCount;
+  const ArrayView<bool, 3>::Shape shape{kHeadings, rows, columns};
+  const ArrayView<bool, 4>::Shape moves{2, kHeadings, rows, columns};
+  const auto count = static_cast<std::size_t>(kHeadings * rows * columns);
+  OwnedGrid made{std::make_unique<bool[]>(count), std::make_unique<bool[]>(2 * count), {}};
+  const ArrayView<bool, 3> blocked(made.blocked.get(), shape);
+  const ArrayView<bool, 4> blocked_moves(made.blocked_moves.get(), moves);
+  made.grid = {origin, step, blocked, blocked_moves};
+  block_poses(made.grid, checker, blocked);
+  block_moves(made.grid, checker, blocked_moves);
+  return made;
+}
+
+template <std::size_t Rank>
+Numpy<const bool, Rank> shown(ArrayView<const bool, Rank> view, nb::handle owner) {
+  std::array<std::size_t, Rank> shape;
+  std::copy(view.shape().begin(), view.shape().end(), shape.begin());
+  return Numpy<const bool, Rank>(view.data(), Rank, shape.data(), owner);
 }
 
 void bind_grid(nb::module_& module) {
-  nb::class_<PoseGrid>(module, "PoseGrid", "A lattice of poses over a static map.")
+  nb::class_<OwnedGrid>(module, "PoseGrid",
+                        "A lattice of poses over a static map; cell (i, j) has its middle at "
+                        "(x, y) + (j, i) * step.")
       .def(
           "__init__",
-          [](PoseGrid* self, double x, double y, double step, const Array<const bool, 3>& blocked,
-             const Array<const bool, 4>& blocked_moves) {
-            new (self) PoseGrid{{x, y}, step, view(blocked), view(blocked_moves)};
+          [](OwnedGrid* self, double x, double y, double step, Index rows, Index columns,
+             const Footprint& shape, const ConvexObstacles& among) {
+            CollisionChecker checker(shape, among);
+            new (self) OwnedGrid(make_grid({x, y}, step, rows, columns, checker));
           },
-          "x"_a, "y"_a, "step"_a, "blocked"_a.noconvert(), "blocked_moves"_a.noconvert(),
-          nb::keep_alive<1, 5>(), nb::keep_alive<1, 6>());
-  module.def(
-      "block_poses",
-      [](const PoseGrid& grid, const Footprint& shape, const ConvexObstacles& among,
-         const Array<bool, 3>& blocked) {
-        CollisionChecker checker(shape, among);
-        block_poses(grid, checker, view(blocked));
-      },
-      "grid"_a, "shape"_a, "among"_a, "blocked"_a.noconvert(), ReleaseGil());
-  module.def(
-      "block_moves",
-      [](const PoseGrid& grid, const Footprint& shape, const ConvexObstacles& among,
-         const Array<bool, 4>& blocked_moves) {
-        CollisionChecker checker(shape, among);
-        block_moves(grid, checker, view(blocked_moves));
-      },
-      "grid"_a, "shape"_a, "among"_a, "blocked_moves"_a.noconvert(), ReleaseGil());
-  module.def(
-      "near_poses",
-      [](const PoseGrid& grid, const OnePose& at, double reach) {
-        const PoseCosts found = near_poses(grid, pose(at), reach);
-        return nb::make_tuple(copied(std::span(found.nodes)), copied(std::span(found.costs)));
-      },
-      "grid"_a, "pose"_a.noconvert(), "reach"_a);
-  module.def(
-      "contact_depths",
-      [](const PoseGrid& grid, const Footprint& shape, const Poses& objects, const Bodies& bodies,
-         const Array<float, 4>& out) {
-        contact_depths(grid, shape, poses(objects), bodies.objects, bodies.radii, view(out));
-      },
-      "grid"_a, "shape"_a, "poses"_a.noconvert(), "bodies"_a, "out"_a.noconvert(), ReleaseGil());
+          "x"_a, "y"_a, "step"_a, "rows"_a, "columns"_a, "shape"_a, "among"_a, ReleaseGil())
+      .def_prop_ro("x", [](const OwnedGrid& self) { return self.grid.origin.x; })
+      .def_prop_ro("y", [](const OwnedGrid& self) { return self.grid.origin.y; })
+      .def_prop_ro("step", [](const OwnedGrid& self) { return self.grid.step; })
+      .def_prop_ro(
+          "blocked",
+          [](nb::handle_t<OwnedGrid> self) {
+            return shown(nb::cast<const OwnedGrid&>(self).grid.blocked, self);
+          },
+          "(16, rows, columns) where something static is in the way.")
+      .def_prop_ro(
+          "blocked_moves",
+          [](nb::handle_t<OwnedGrid> self) {
+            return shown(nb::cast<const OwnedGrid&>(self).grid.blocked_moves, self);
+          },
+          "(2, 16, rows, columns) from where it is in the way of the move ahead, and of the turn to "
+          "the next heading.")
+      .def(
+          "near_poses",
+          [](const OwnedGrid& self, const OnePose& at, double reach) {
+            const PoseCosts found = near_poses(self.grid, pose(at), reach);
+            return std::pair(copied(std::span(found.nodes)), copied(std::span(found.costs)));
+          },
+          "pose"_a.noconvert(), "reach"_a,
+          "Flat indices of free poses within `reach` cells, and the cost of going there [m].")
+      .def(
+          "contact_depths",
+          [](const OwnedGrid& self, const Footprint& shape, const Poses& objects,
+             const Bodies& bodies) {
+            const PoseGrid& grid = self.grid;
+            NewArray<float, 4> out({extent(objects, 0), static_cast<Index>(kHeadingCount),
+                                    grid.rows(), grid.columns()});
+            without_gil([&] {
+              contact_depths(grid, shape, poses(objects), bodies.objects, bodies.radii,
+                             out.view());
+            });
+            return out.give();
+          },
+          "shape"_a, "poses"_a.noconvert(), "bodies"_a, kOwned,
+          "(K, 16, rows, columns) depth of the footprint in each object [m].")
+      .def(
+          "search",
+          [](const OwnedGrid& self, const Integers<1>& starts, const Floats<1>& start_costs,
+             const Floats<3>& depths, const Floats<3>& touch, double turn_cost, double arm,
+             const Integers<1>& targets) {
+            const auto count = static_cast<Index>(depths.size());
+            NewArray<double, 1> costs({count});
+            NewArray<Index, 1> before({count});
+            without_gil([&] {
+              PoseSearch search({self.grid, view(depths), view(touch), turn_cost, arm},
+                                costs.numbers(), before.numbers());
+              search.run({view(starts), view(start_costs)}, view(targets));
+            });
+            return std::pair(costs.give(), before.give());
+          },
+          "starts"_a.noconvert(), "start_costs"_a.noconvert(), "depths"_a.noconvert(),
+          "touch"_a.noconvert(), "turn_cost"_a, "arm"_a, "targets"_a.noconvert(),
+          "Cost of each pose [m], and the pose before it, -1 for none. Ends with the last target.");
   module.def(
       "add_layers",
-      [](const Array<const float, 4>& layers, const Floats<1>& weights, const FloatsOut<3>& depth,
-         const FloatsOut<3>& touch) {
-        add_layers(view(layers), view(weights), view(depth), view(touch));
+      [](const Array<const float, 4>& layers, const Floats<1>& weights) {
+        const NewArray<double, 3>::Shape shape{extent(layers, 1), extent(layers, 2),
+                                               extent(layers, 3)};
+        NewArray<double, 3> depth(shape);
+        NewArray<double, 3> touch(shape);
+        without_gil(
+            [&] { add_layers(view(layers), view(weights), depth.view(), touch.view()); });
+        return std::pair(depth.give(), touch.give());
       },
-      "layers"_a.noconvert(), "weights"_a.noconvert(), "depth"_a.noconvert(),
-      "touch"_a.noconvert(), ReleaseGil());
-  module.def(
-      "search_poses",
-      [](const PoseGrid& grid, const Integers<1>& starts, const Floats<1>& start_costs,
-         const Floats<3>& depths, const Floats<3>& touch, double turn_cost, double arm,
-         const Integers<1>& targets, const FloatsOut<1>& costs, const IntegersOut<1>& before) {
-        PoseSearch search({grid, view(depths), view(touch), turn_cost, arm}, view(costs),
-                          view(before));
-        search.run({view(starts), view(start_costs)}, view(targets));
-      },
-      "grid"_a, "starts"_a.noconvert(), "start_costs"_a.noconvert(), "depths"_a.noconvert(),
-      "touch"_a.noconvert(), "turn_cost"_a, "arm"_a, "targets"_a.noconvert(),
-      "costs"_a.noconvert(), "before"_a.noconvert(), ReleaseGil());
+      "layers"_a.noconvert(), "weights"_a.noconvert(),
+      "Depth in all objects of weight at each pose [m], and the weights of those it is in.");
   module.def(
       "least_costs",
       [](const Floats<1>& costs, const Integers<1>& nodes, const Floats<1>& extra,
-         const Integers<1>& ends, const FloatsOut<1>& out) {
-        least_costs(view(costs), {view(nodes), view(extra), view(ends)}, view(out));
+         const Integers<1>& ends) {
+        NewArray<double, 1> out({extent(ends, 0)});
+        least_costs(view(costs), {view(nodes), view(extra), view(ends)}, out.numbers());
+        return out.give();
       },
       "costs"_a.noconvert(), "nodes"_a.noconvert(), "extra"_a.noconvert(), "ends"_a.noconvert(),
-      "out"_a.noconvert(), ReleaseGil());
+      kOwned, "(N,) cost of getting to places, each by those of the poses that end there [m].");
 }
 
 void bind_poses(nb::module_& module) {
   module.def(
       "pose_behind",
       [](const OnePose& object, const Points& outline, double heading, double shift,
-         double distance, const FloatsOut<1>& out) {
-        *reinterpret_cast<Pose*>(out.data()) =
-            pose_behind(pose(object), points(outline), heading, shift, distance);
+         double distance) {
+        NewArray<double, 1> out({3});
+        *out.as<Pose>() = pose_behind(pose(object), points(outline), heading, shift, distance);
+        return out.give();
       },
       "pose"_a.noconvert(), "outline"_a.noconvert(), "heading"_a, "shift"_a, "distance"_a,
-      "out"_a.noconvert());
+      kOwned);
   module.def(
       "pushable_moves",
       [](const Floats<3>& middles, const Array<const bool, 2>& is_open, const Floats<1>& shifts,
-         double distance, const Footprint& shape, const ConvexObstacles& among,
-         const Array<bool, 3>& out) {
-        CollisionChecker checker(shape, among);
-        const auto* corners = reinterpret_cast<const Vec2*>(middles.data());
-        pushable_moves({corners, {extent(middles, 0), extent(middles, 1)}}, view(is_open),
-                       view(shifts), distance, checker, view(out));
+         double distance, const Footprint& shape, const ConvexObstacles& among) {
+        NewArray<bool, 3> out(
+            {static_cast<Index>(kHeadingCount), extent(middles, 0), extent(middles, 1)});
+        without_gil([&] {
+          CollisionChecker checker(shape, among);
+          const auto* corners = reinterpret_cast<const Vec2*>(middles.data());
+          pushable_moves({corners, {extent(middles, 0), extent(middles, 1)}}, view(is_open),
+                         view(shifts), distance, checker, out.view());
+        });
+        return out.give();
       },
       "middles"_a.noconvert(), "is_open"_a.noconvert(), "shifts"_a.noconvert(), "distance"_a,
-      "shape"_a, "among"_a, "out"_a.noconvert(), ReleaseGil());
-  module.def(
-      "cheapest_legs",
-      [](const Points& line, double heading, double end, Index first, Index longest, double step,
-         double turn_cost, double arm, const Footprint& shape, const Footprint& tight,
-         const ConvexObstacles& among, const Poses& objects, const Bodies& bodies,
-         const Floats<1>& weights) {
-        const Legs legs = [&] {
-          nb::gil_scoped_release released;
-          RouteSearch search({step, turn_cost, arm}, shape, tight, among,
-                             {poses(objects), bodies.objects, bodies.radii, view(weights)});
-          return search.cheapest_legs(points(line), heading, end, first, longest);
-        }();
-        return nb::make_tuple(copied(std::span<const double>(legs.costs)),
+      "shape"_a, "among"_a, kOwned,
+      "(16, rows, columns) whether the robot fits behind an object to push it along each heading.");
+  nb::class_<RouteSearch>(module, "RouteSearch",
+                          "Costs of motions among objects and walls, with memory for one thread.")
+      .def(
+          "__init__",
+          [](RouteSearch* self, double step, double turn_cost, double arm, const Footprint& shape,
+             const Footprint& tight, const ConvexObstacles& among, const Poses& objects,
+             const Bodies& bodies, const Floats<1>& weights) {
+            new (self) RouteSearch({step, turn_cost, arm}, shape, tight, among,
+                                   {poses(objects), bodies.objects, bodies.radii, view(weights)});
+          },
+          "step"_a, "turn_cost"_a, "arm"_a, "shape"_a, "tight"_a, "among"_a,
+          "poses"_a.noconvert(), "bodies"_a, "weights"_a.noconvert(), nb::keep_alive<1, 5>(),
+          nb::keep_alive<1, 6>(), nb::keep_alive<1, 7>(), nb::keep_alive<1, 8>(),
+          nb::keep_alive<1, 9>(), nb::keep_alive<1, 10>())
+      .def(
+          "cheapest_legs",
+          [](RouteSearch& self, const Points& line, double heading, double end, Index first,
+             Index longest) {
+            const Legs legs = [&] {
+              nb::gil_scoped_release released;
+              return self.cheapest_legs(points(line), heading, end, first, longest);
+            }();
+            return std::tuple(copied(std::span<const double>(legs.costs)),
                               copied(std::span(legs.before)),
                               copied_rows<double>(std::span(legs.turns)));
-      },
-      "points"_a.noconvert(), "heading"_a, "end"_a, "first"_a, "longest"_a, "step"_a,
-      "turn_cost"_a, "arm"_a, "shape"_a, "tight"_a, "among"_a, "poses"_a.noconvert(), "bodies"_a,
-      "weights"_a.noconvert());
+          },
+          "points"_a.noconvert(), "heading"_a, "end"_a, "first"_a, "longest"_a,
+          "Costs of ending ahead and back; the row before each row (2 i, 2 i + 1); (2 N, 2) turns "
+          "before and after.");
 }
 
 void bind_pushes(nb::module_& module) {
@@ -182,6 +306,17 @@ void bind_pushes(nb::module_& module) {
             new (self) PushingController{step, turn, size, half_width, front, ahead, gain};
           },
           "step"_a, "turn"_a, "size"_a, "half"_a, "front"_a, "ahead"_a, "gain"_a)
+      .def_ro("step", &PushingController::step, "Distance between two commands [m].")
+      .def_ro("turn", &PushingController::turn, "Greatest turn in one step [rad].")
+      .def_ro("ahead", &PushingController::ahead,
+              "Look-ahead distance of the object on its path [m].")
+      .def(
+          "with_gain",
+          [](PushingController self, double gain) {
+            self.gain = gain;
+            return self;
+          },
+          "gain"_a)
       .def(
           "is_on_bumper",
           [](const PushingController& self, const OnePose& robot, const OnePose& object) {
@@ -194,64 +329,84 @@ void bind_pushes(nb::module_& module) {
              const Points& path, double reached, double shift) {
             const PushCommand command =
                 steer_push(pose(robot), pose(object), points(path), reached, shift, self);
-            return nb::make_tuple(command.step, command.turn, command.reached, command.holds);
+            return std::tuple(command.step, command.turn, command.reached, command.holds);
           },
           "robot"_a.noconvert(), "target"_a.noconvert(), "path"_a.noconvert(), "reached"_a,
-          "shift"_a);
+          "shift"_a,
+          "Step [m], turn [rad], arc length now [m], and whether the object is on the bumper.");
   module.def(
       "along_path",
       [](double x, double y, const Points& path, double reached, double ahead) {
         const Carrot carrot = along_path({x, y}, points(path), reached, ahead);
-        return nb::make_tuple(carrot.point.x, carrot.point.y, carrot.reached, carrot.distance);
+        return std::tuple(carrot.point.x, carrot.point.y, carrot.reached, carrot.distance);
       },
-      "x"_a, "y"_a, "path"_a.noconvert(), "reached"_a, "ahead"_a);
+      "x"_a, "y"_a, "path"_a.noconvert(), "reached"_a, "ahead"_a,
+      "The point to head for, the arc length of the nearest one, and the distance to that [m].");
 
-  nb::class_<QuasiStaticSettings>(module, "QuasiStaticSettings")
+  nb::class_<PushRollout>(module, "PushRollout", "Rollouts of pushes, with memory for one thread.")
       .def(
           "__init__",
-          [](QuasiStaticSettings* self, double max_step, double tolerance, double jam_depth,
-             Index iterations, double friction, double static_friction) {
-            new (self) QuasiStaticSettings{max_step,   tolerance, jam_depth,
-                                           iterations, friction,  static_friction};
+          [](PushRollout* self, const Bodies& bodies, const ObjectGoal& goal, double max_step,
+             double tolerance, double jam_depth, Index iterations, double friction,
+             double static_friction) {
+            new (self) PushRollout(
+                bodies, {max_step, tolerance, jam_depth, iterations, friction, static_friction},
+                goal);
           },
-          "max_step"_a, "tolerance"_a, "jam_depth"_a, "iterations"_a, "friction"_a,
-          "static_friction"_a);
-  nb::class_<PushRollout>(module, "PushRollout", "Rollouts of pushes, with memory for one thread.")
-      .def(nb::init<const Bodies&, const QuasiStaticSettings&, const ObjectGoal&>(), "bodies"_a,
-           "settings"_a, "goal"_a, nb::keep_alive<1, 2>(), nb::keep_alive<1, 4>())
+          "bodies"_a, "goal"_a, "max_step"_a, "tolerance"_a, "jam_depth"_a, "iterations"_a,
+          "friction"_a, "static_friction"_a, nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>())
       .def(
           "run",
           [](PushRollout& self, const OnePose& start, const Poses& objects, Index target,
              const Points& path, double shift, double limit, const Bools& wanted,
-             const PushingController& controller, const PosesOut& track,
-             const IntegersOut<1>& steps, const FloatsOut<3>& stage_poses,
-             const FloatsOut<2>& stage_lengths, const FloatsOut<1>& box) {
-            const RolloutSize size =
-                self.run(pose(start), poses(objects),
-                         {target, points(path), shift, limit, view(wanted)}, controller,
-                         {poses(track), view(steps), pose_matrix(stage_poses),
-                          view(stage_lengths), reinterpret_cast<Box*>(box.data())});
-            return std::pair{size.stages, size.poses};
+             const PushingController& controller, Index longest) {
+            const Index count = extent(objects, 0);
+            NewArray<double, 2> track({longest, 3});
+            NewArray<Index, 1> steps({kStages});
+            NewArray<double, 3> stages({kStages, count, 3});
+            NewArray<double, 2> lengths({kStages, count});
+            NewArray<double, 1> box({4});
+            RolloutSize size{};
+            without_gil([&] {
+              size = self.run(pose(start), poses(objects),
+                              {target, points(path), shift, limit, view(wanted)}, controller,
+                              {{track.as<Pose>(), static_cast<std::size_t>(longest)},
+                               steps.numbers(),
+                               {stages.as<Pose>(), {kStages, count}},
+                               lengths.view(),
+                               box.as<Box>()});
+            });
+            const auto used = static_cast<std::size_t>(size.poses);
+            return std::tuple(copied_rows<double>(std::span(track.as<const Pose>(), used)),
+                              steps.give(size.stages), stages.give(size.stages),
+                              lengths.give(size.stages), box.give());
           },
           "start"_a.noconvert(), "poses"_a.noconvert(), "target"_a, "path"_a.noconvert(),
-          "shift"_a, "limit"_a, "wanted"_a.noconvert(), "controller"_a, "track"_a.noconvert(),
-          "steps"_a.noconvert(), "stage_poses"_a.noconvert(), "stage_lengths"_a.noconvert(),
-          "box"_a.noconvert(), ReleaseGil());
+          "shift"_a, "limit"_a, "wanted"_a.noconvert(), "controller"_a, "longest"_a,
+          "(T, 3) poses of the robot, at most `longest`; (S,) how many of them each stage has; "
+          "(S, K, 3) the objects and (S, K) their path lengths at its end [m]; (4,) the box around "
+          "all that moved and its surroundings [m].");
   module.def(
       "sweep_arcs",
       [](QuasiStatic& model, const OnePose& start, const Poses& objects, const Floats<2>& arcs,
-         Index target, double size, double least, const FloatsOut<3>& tracks,
-         const FloatsOut<4>& out) {
-        ArcSweep sweep{pose_matrix(tracks), pose_matrices(out)};
-        {
-          nb::gil_scoped_release released;
+         Index steps, Index target, double size, double least) {
+        const Index count = extent(objects, 0);
+        NewArray<double, 3> tracks({extent(arcs, 0), steps + 1, 3});
+        NewArray<double, 4> out({extent(arcs, 0), steps + 1, count, 3});
+        ArcSweep sweep{{tracks.as<Pose>(), {extent(arcs, 0), steps + 1}},
+                       {out.as<Pose>(), {extent(arcs, 0), steps + 1, count}}};
+        without_gil([&] {
           sweep_arcs(model, pose(start), poses(objects), rows_as<const ArcStep>(arcs),
                      {target, size, least}, sweep);
-        }
-        return copied_rows<Index>(std::span<const ArcSweep::Mark>(sweep.marks));
+        });
+        return std::tuple(tracks.give(), out.give(),
+                          copied_rows<Index>(std::span<const ArcSweep::Mark>(sweep.marks)));
       },
-      "model"_a, "start"_a.noconvert(), "poses"_a.noconvert(), "arcs"_a.noconvert(), "target"_a,
-      "size"_a, "least"_a, "tracks"_a.noconvert(), "out"_a.noconvert(), kOwned);
+      "model"_a, "start"_a.noconvert(), "poses"_a.noconvert(), "arcs"_a.noconvert(), "steps"_a,
+      "target"_a, "size"_a, "least"_a,
+      "(A, steps + 1, 3) poses of the robot along arcs, (A, steps + 1, K, 3) of the objects, and "
+      "(N, 2) the arcs and steps at which the target has moved on. What lies beyond the last of "
+      "them on an arc is not defined.");
 }
 
 }  // namespace

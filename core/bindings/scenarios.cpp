@@ -1,3 +1,8 @@
+#include <nanobind/stl/tuple.h>
+
+#include <tuple>
+#include <vector>
+
 #include "arrays.hpp"
 #include "pushplan/scenarios/floes.hpp"
 
@@ -8,8 +13,8 @@ using namespace nb::literals;
 namespace {
 
 /// (K, N, 2) numbers as K rows of N points.
-template <class Point, class Array>
-ArrayView<Point, 2> corner_rows(const Array& array) {
+template <class Point, class Numbers>
+ArrayView<Point, 2> corner_rows(const Numbers& array) {
   return {reinterpret_cast<Point*>(array.data()),
           {static_cast<Index>(array.shape(0)), static_cast<Index>(array.shape(1))}};
 }
@@ -18,15 +23,21 @@ Outlines outlines(const Floats<3>& corners, const Integers<1>& counts) {
   return {corner_rows<const Vec2>(corners), view(counts)};
 }
 
-OutlinesOut outlines_out(const FloatsOut<3>& corners, const IntegersOut<1>& counts) {
-  return {corner_rows<Vec2>(corners), view(counts)};
-}
+/// Outlines to be filled and returned.
+struct NewOutlines {
+  explicit NewOutlines(std::size_t count)
+      : corners(zeros<double, 3>({count, kFloeCorners, 2})), counts(zeros<Index, 1>({count})) {}
+
+  OutlinesOut out() const { return {corner_rows<Vec2>(corners), view(counts)}; }
+  auto arrays() const { return std::tuple(corners, counts); }
+
+  NewArray<double, 3> corners;
+  NewArray<Index, 1> counts;
+};
 
 }  // namespace
 
 void bind_scenarios(nb::module_& module) {
-  module.attr("FLOE_CORNERS") = kFloeCorners;
-
   nb::class_<IceWater>(module, "IceWater", "A rectangle of water with regions to stay off.")
       .def(
           "__init__",
@@ -36,41 +47,62 @@ void bind_scenarios(nb::module_& module) {
             new (self) IceWater{b[0], b[1], b[2], b[3], {points(blocks), view(block_offsets)}, gap};
           },
           "box"_a.noconvert(), "blocks"_a.noconvert(), "block_offsets"_a.noconvert(), "gap"_a,
-          nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>());
+          nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>())
+      .def_ro("gap", &IceWater::gap, "Least distance between floes, and to the regions [m].");
 
   module.def(
       "cut_cells",
       [](const Points& centres, const Floats<1>& radii, const Floats<1>& reaches,
          const Integers<1>& neighbours, const Integers<1>& neighbour_offsets,
-         const IceWater& water, const FloatsOut<3>& corners, const IntegersOut<1>& counts) {
-        cut_cells({points(centres), view(radii), view(reaches), view(neighbours),
-                   view(neighbour_offsets)},
-                  water, outlines_out(corners, counts));
+         const IceWater& water) {
+        const NewOutlines cells(centres.shape(0));
+        const OutlinesOut out = cells.out();
+        {
+          nb::gil_scoped_release release;
+          cut_cells({points(centres), view(radii), view(reaches), view(neighbours),
+                     view(neighbour_offsets)},
+                    water, out);
+        }
+        return cells.arrays();
       },
       "centres"_a.noconvert(), "radii"_a.noconvert(), "reaches"_a.noconvert(),
       "neighbours"_a.noconvert(), "neighbour_offsets"_a.noconvert(), "water"_a,
-      "corners"_a.noconvert(), "counts"_a.noconvert(), ReleaseGil());
+      "Cells of a power diagram (Laguerre tessellation), half a gap smaller on every side: corners "
+      "in rows of equal length, and how many of each row are in use.");
 
   module.def(
       "fit_floes",
       [](const Floats<3>& shapes, const Integers<1>& shape_counts, const Points& centres,
          const Floats<3>& cells, const Integers<1>& cell_counts, const Floats<1>& targets,
-         double stretch, const FloatsOut<3>& corners, const IntegersOut<1>& counts) {
-        fit_floes(outlines(shapes, shape_counts), points(centres), outlines(cells, cell_counts),
-                  view(targets), stretch, outlines_out(corners, counts));
+         double stretch) {
+        const NewOutlines floes(centres.shape(0));
+        const OutlinesOut out = floes.out();
+        {
+          nb::gil_scoped_release release;
+          fit_floes(outlines(shapes, shape_counts), points(centres), outlines(cells, cell_counts),
+                    view(targets), stretch, out);
+        }
+        return floes.arrays();
       },
       "shapes"_a.noconvert(), "shape_counts"_a.noconvert(), "centres"_a.noconvert(),
       "cells"_a.noconvert(), "cell_counts"_a.noconvert(), "targets"_a.noconvert(), "stretch"_a,
-      "corners"_a.noconvert(), "counts"_a.noconvert(), ReleaseGil());
+      "Shapes of area 1 grown within their cells until they have their target areas, or cannot "
+      "grow further.");
 
   module.def(
       "place_discs",
       [](const Floats<1>& radii, const Floats<3>& draws, const Floats<2>& density,
-         const IceWater& water, const FloatsOut<2>& centres) {
-        return place_discs(view(radii), view(draws), view(density), water, rows_as<Vec2>(centres));
+         const IceWater& water) {
+        std::vector<Vec2> centres(radii.shape(0));
+        {
+          nb::gil_scoped_release release;
+          const Index placed = place_discs(view(radii), view(draws), view(density), water, centres);
+          centres.resize(static_cast<std::size_t>(placed));
+        }
+        return copied_rows<double>(std::span<const Vec2>(centres));
       },
       "radii"_a.noconvert(), "draws"_a.noconvert(), "density"_a.noconvert(), "water"_a,
-      "centres"_a.noconvert(), ReleaseGil());
+      "(J, 2) centres of the first J discs, largest first, which found a place.");
 }
 
 }  // namespace pushplan::bindings

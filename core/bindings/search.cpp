@@ -1,4 +1,5 @@
 #include "arrays.hpp"
+#include "pushplan/search/astar.hpp"
 #include "pushplan/search/grid_dijkstra.hpp"
 #include "pushplan/search/search_tree.hpp"
 
@@ -7,6 +8,10 @@ namespace pushplan::bindings {
 using namespace nb::literals;
 
 void bind_search(nb::module_& module) {
+  nb::enum_<SearchStatus>(module, "SearchStatus", "How far a search has come.")
+      .value("EXHAUSTED", SearchStatus::kExhausted, "No path exists.")
+      .value("FOUND", SearchStatus::kFound, "The cheapest open node is a goal.")
+      .value("PAUSED", SearchStatus::kPaused, "The budget was used up.");
   nb::class_<SearchTree>(module, "SearchTree", "Cheapest paths known so far, and the open nodes.")
       .def(nb::init<Index>(), "size"_a)
       .def("clear", &SearchTree::clear)

@@ -19,6 +19,6 @@ from pushplan._core import (
 )
 
 
-SOURCES: str = '49c600bd1edc'
+SOURCES: str = '1a7ba3be2d43'
 
 COMPILER: str = 'GNU 12.2.0'

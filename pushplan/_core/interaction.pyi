@@ -50,9 +50,9 @@ class IceInteraction:
 class CalledInteraction:
     """Any model behind a C function."""
 
-    def __init__(self, address: int, radii: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], inverse_masses: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> None:
+    def __init__(self, function: int, context: int, radii: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], inverse_masses: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], owner: object | None = None) -> None:
         """
-        The function at `address` is a `CalledInteraction::Advance` and outlives the model.
+        Addresses of a `CalledInteraction::Advance` and of what it is given as its context; `owner` is kept alive for them.
         """
 
     def advance(self, robot_from: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], robot_to: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], poses: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu')], lengths: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> bool: ...

@@ -1,5 +1,6 @@
 """Arcs, shortcuts and state lattices."""
 
+import enum
 from typing import Annotated, overload
 
 import numpy
@@ -72,8 +73,7 @@ class LatticeSearch:
 
     def start(self, node: int, cost: float = 0.0, bound: float = 0.0, edge: int = -1) -> None: ...
 
-    def run(self, budget: int) -> int:
-        """0: no path exists; 1: the goal was reached; 2: paused."""
+    def run(self, budget: int) -> pushplan._core.search.SearchStatus: ...
 
     @property
     def goal(self) -> int: ...
@@ -91,6 +91,9 @@ class Footprint:
     """Convex parts of a robot."""
 
     def __init__(self, vertices: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], offsets: Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C', device='cpu', writable=False)], radius: float) -> None: ...
+
+    @property
+    def radius(self) -> float: ...
 
 class ConvexObstacles:
     """Convex polygons in groups of neighbours."""
@@ -155,13 +158,21 @@ def fill_cell_weights(out: Annotated[NDArray[numpy.float64], dict(shape=(None, N
 
 def recovery_path(start: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], steps: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], body: Footprint, grown: Footprint, among: ConvexObstacles, size: float) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None))]: ...
 
+class RoomOutcome(enum.Enum):
+    """What an exploration has found out."""
+
+    AWAY = 0
+
+    CLOSED = 1
+
+    PAUSED = 2
+
 class RoomExploration:
     """A search for a way to get away, in batches."""
 
     def __init__(self, footprint: Footprint, walls: ConvexObstacles, goal: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], spacing: float, moves: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], reach: float, clearance: float, breadth: bool, start: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], side: float, turn: float, half: int, headings: int, capacity: int) -> None: ...
 
-    def run(self, upto: int) -> int:
-        """0: got away; 1: no way; 2: paused."""
+    def run(self, upto: int) -> RoomOutcome: ...
 
     @property
     def arcs(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None))]: ...

@@ -7,12 +7,19 @@ from numpy.typing import NDArray
 
 import pushplan._core.interaction
 import pushplan._core.motion
+import pushplan._core.search
 
 
 class CostToGo:
     """A table of lengths to the goal."""
 
     def __init__(self, values: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], floor: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], x: float, y: float, cell: float) -> None: ...
+
+    @property
+    def shape(self) -> tuple[int, int, int]: ...
+
+    @property
+    def cell(self) -> float: ...
 
     def length_to_go(self, x: float, y: float, theta: float) -> float: ...
 
@@ -48,8 +55,7 @@ class PushTree:
 class PushSearch:
     """A best-first search over arcs that push."""
 
-    def run(self, budget: int) -> int:
-        """0: no path exists; 1: the goal was reached; 2: paused."""
+    def run(self, budget: int) -> pushplan._core.search.SearchStatus: ...
 
     @property
     def goal(self) -> int:

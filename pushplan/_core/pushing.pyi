@@ -1,5 +1,6 @@
 """Predictive pushing of one box along a path."""
 
+from collections.abc import Sequence
 from typing import Annotated
 
 import numpy
@@ -14,6 +15,38 @@ class BoxContact:
 
     def __init__(self, front: float, half: float, curvature: float, depth: float, low: float, high: float, spread: float, friction: float) -> None: ...
 
+    @property
+    def front(self) -> float:
+        """X of the bumper in its middle, from the axle [m]."""
+
+    @property
+    def half(self) -> float:
+        """Half the bumper's width [m]."""
+
+    @property
+    def curvature(self) -> float:
+        """Curvature of the bumper's front [1/m]."""
+
+    @property
+    def depth(self) -> float:
+        """From the pushed face to the box's centre [m]."""
+
+    @property
+    def low(self) -> float:
+        """Right end of the face from the centre [m], negative."""
+
+    @property
+    def high(self) -> float:
+        """Left end of the face [m]."""
+
+    @property
+    def spread(self) -> float:
+        """Greatest torque over force of the ground [m]."""
+
+    @property
+    def friction(self) -> float:
+        """Coefficient between bumper and box."""
+
     def line(self, offset: float) -> tuple[float, float]: ...
 
     def standoff(self, offset: float, angle: float) -> tuple[float, float]: ...
@@ -24,9 +57,9 @@ class BoxContact:
 
     def roll_out(self, start: Annotated[NDArray[numpy.float64], dict(shape=(6), order='C', device='cpu', writable=False)], twists: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], steps: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], states: Annotated[NDArray[numpy.float64], dict(shape=(None, 6), order='C', device='cpu')], motions: Annotated[NDArray[numpy.float64], dict(shape=(None, 6), order='C', device='cpu')]) -> None: ...
 
-    def observe(self, normal: float, robot: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], box: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+    def observe(self, normal: float, robot: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], box: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
 
-    def box_pose(self, state: Annotated[NDArray[numpy.float64], dict(shape=(6), order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+    def box_pose(self, state: Annotated[NDArray[numpy.float64], dict(shape=(6), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
 
 class Clearance:
     """Distances of robot and box from static things."""
@@ -57,7 +90,7 @@ class PushAssembly:
 class Faces:
     """The sides of a box on one bumper."""
 
-    def __init__(self, scores: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], contacts: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], normals: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], curvatures: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> None: ...
+    def __init__(self, scores: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], contacts: Sequence[BoxContact], normals: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], curvatures: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> None: ...
 
 class PushTracker:
     """Pushes one box along one path."""
@@ -70,9 +103,9 @@ class PushTracker:
 
     def assemble(self, track: pushplan._core.control.ReferencePath, held: float) -> None: ...
 
-    def drive(self, obstacles: pushplan._core.geometry.Obstacles, solved: bool, time: float, held: float, out: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+    def drive(self, obstacles: pushplan._core.geometry.Obstacles, solved: bool, time: float, held: float) -> tuple[float, float]: ...
 
-    def send(self, v: float, w: float, time: float, held: float, out: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+    def send(self, v: float, w: float, time: float, held: float) -> tuple[float, float]: ...
 
     @property
     def face(self) -> int: ...

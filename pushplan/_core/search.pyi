@@ -1,10 +1,23 @@
 """Shortest paths on graphs."""
 
+import enum
 from typing import Annotated
 
 import numpy
 from numpy.typing import NDArray
 
+
+class SearchStatus(enum.Enum):
+    """How far a search has come."""
+
+    EXHAUSTED = 0
+    """No path exists."""
+
+    FOUND = 1
+    """The cheapest open node is a goal."""
+
+    PAUSED = 2
+    """The budget was used up."""
 
 class SearchTree:
     """Cheapest paths known so far, and the open nodes."""

@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from pushplan.compiled import kernel
 from pushplan.control.limits import clamp_twist
-from pushplan.geometry.transforms import arc_step
-from pushplan.motion.collision import ConvexObstacles, Footprint, footprint, is_free, obstacles
+from pushplan.core import control as core
+from pushplan.motion.collision import footprint, obstacles
 from pushplan.world import Twist, World
-from pushplan.world.checks import FloatArray
 
 _AHEAD = (1.0, 0.5, 0.25, 0.0)
 """Distances straight ahead at which circles are tried [circumscribed radii]."""
@@ -35,8 +31,6 @@ def waiting_twist(world: World) -> Twist:
         return Twist(0.0, 0.0)
     shape = footprint(robot)
     walls = obstacles(world.static)
-    scratch = np.empty_like(shape.vertices)
-    at = np.empty(3)
     circle = math.tau * robot.turning_radius
     step = min(_SPACING * shape.radius, circle / 16.0)
 
@@ -45,8 +39,8 @@ def waiting_twist(world: World) -> Twist:
         turn = step * twist.angular / twist.linear
         first = math.ceil(ahead / step)
         most = math.ceil((ahead + length) / step)
-        at[:] = world.robot_pose
-        return step * _clear_steps(step, turn, first, most, shape, walls, at, scratch) - ahead
+        at = world.robot_pose
+        return step * core.clear_steps(step, turn, first, most, shape, walls, at) - ahead
 
     arcs = [clamp_twist(robot, robot.max_speed, share * robot.max_turn_rate) for share in _TURNS]
     for ahead in _AHEAD:
@@ -54,22 +48,3 @@ def waiting_twist(world: World) -> Twist:
             if clear(arc, circle, ahead * shape.radius) >= circle:
                 return arcs[0] if ahead else arc
     return max(arcs, key=lambda arc: clear(arc, circle + shape.radius))
-
-
-@kernel
-def _clear_steps(
-    step: float,
-    turn: float,
-    first: int,
-    most: int,
-    shape: Footprint,
-    walls: ConvexObstacles,
-    at: FloatArray,  # (3,) where it begins; ends where it touches
-    scratch: FloatArray,  # (V, 2) memory for the corners
-) -> int:
-    """Return the number of steps, the first ones straight, that the robot can go before a wall."""
-    for done in range(most):
-        arc_step(at, step, turn if done >= first else 0.0, at)
-        if not is_free(at, shape, walls, scratch):
-            return done
-    return most

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pushplan.compiled import copy_into, kernel
-from pushplan.geometry.obstacles import Obstacles, obstacle_distance, obstacles_of
+from pushplan.core import geometry as core
+from pushplan.geometry.obstacles import obstacles_of
 from pushplan.world import StaticMap
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, frozen
 from pushplan.world.outline import next_corner
@@ -33,6 +33,11 @@ class Contours(NamedTuple):
     outgoing: FloatArray  # (V, 2) unit direction to the next corner
     owner: IntArray  # (V,) index of the obstacle
     following: IntArray  # (V,) index of the next corner of the same obstacle
+
+    @property
+    def bends(self) -> core.Bends:
+        """The corners for the core."""
+        return core.Bends(self.corners, self.incoming, self.outgoing)
 
 
 def gap_of(static: StaticMap) -> float:
@@ -138,50 +143,6 @@ def _outlines(
     reach = radii[core[source]] / np.cos(part / 2.0)
     ray = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     return np.ascontiguousarray(cores[source] + reach[:, None] * ray), core[source]
-
-
-@kernel(allocates=True)
-def free_points(points: FloatArray, obstacles: Obstacles, box: FloatArray, gap: float) -> BoolArray:
-    """Check which points (N, 2) [m] lie in the box (4,) and ``gap`` or more off every obstacle."""
-    keep = np.empty(points.shape[0], dtype=np.bool_)
-    for i in range(points.shape[0]):
-        x = points[i, 0]
-        y = points[i, 1]
-        inside = box[0] - gap <= x <= box[2] + gap and box[1] - gap <= y <= box[3] + gap
-        keep[i] = inside and obstacle_distance(x, y, obstacles) >= gap
-    return keep
-
-
-@kernel(allocates=True)
-def segment_crossings(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Points (N, 2) [m] where segments (A, 4) x1, y1, x2, y2 cross others (B, 4)."""
-    found = np.empty((16, 2))
-    count = 0
-    for i in range(first.shape[0]):
-        px = first[i, 0]
-        py = first[i, 1]
-        dx = first[i, 2] - px
-        dy = first[i, 3] - py
-        for j in range(second.shape[0]):
-            ax = second[j, 0]
-            ay = second[j, 1]
-            ex = second[j, 2] - ax
-            ey = second[j, 3] - ay
-            across = dx * ey - dy * ex
-            if across == 0.0:
-                continue
-            t = ((ax - px) * ey - (ay - py) * ex) / across
-            u = ((ax - px) * dy - (ay - py) * dx) / across
-            if t < 0.0 or t > 1.0 or u < 0.0 or u > 1.0:
-                continue
-            if count == found.shape[0]:
-                larger = np.empty((2 * count, 2))
-                copy_into(larger[:count], found)
-                found = larger
-            found[count, 0] = px + t * dx
-            found[count, 1] = py + t * dy
-            count += 1
-    return found[:count]
 
 
 def box_edges(box: FloatArray) -> FloatArray:

@@ -12,39 +12,13 @@ from numpy.typing import ArrayLike
 from scipy import ndimage
 
 from pushplan.compiled import kernel
+from pushplan.core import geometry as core
 from pushplan.geometry.contours import standoff_of
 from pushplan.geometry.grid import Grid, clearance_field
-from pushplan.geometry.obstacles import obstacle_distance
 from pushplan.geometry.regions import outside_area
 from pushplan.geometry.shortest_path import GoalDistances, goal_distances
-from pushplan.geometry.visibility import NO_LEG, GoalScene, Nodes, goal_leg, node_leg
 from pushplan.world import Goal, StaticMap
 from pushplan.world.checks import FloatArray, array, frozen, number
-
-
-@kernel(allocates=True)
-def _fill_distances(
-    out: FloatArray, origin: FloatArray, step: float, nodes: Nodes, scene: GoalScene, sliver: float
-) -> None:
-    """Write the distance [m] to the goal at the centre of each cell."""
-    obstacles = scene.obstacles
-    box = scene.box
-    gap = scene.gap
-    for i in range(out.shape[0]):
-        y = origin[1] + (i + 0.5) * step
-        hint = NO_LEG
-        for j in range(out.shape[1]):
-            x = origin[0] + (j + 0.5) * step
-            out[i, j] = math.inf
-            if x > box[2] + gap or y > box[3] + gap:
-                continue
-            clearance = obstacle_distance(x, y, obstacles)
-            if clearance < gap:
-                continue
-            length, _, _ = goal_leg(x, y, scene)
-            tangent_only = clearance > sliver
-            best, hint = node_leg(x, y, length, hint, tangent_only, nodes, obstacles, gap)
-            out[i, j] = best
 
 
 @kernel(allocates=True)
@@ -109,7 +83,7 @@ class GeodesicField:
         Where the point's own cell is blocked, `filled` counts. inf where no way leads to the goal.
         """
         o = self.grid.origin
-        return sample_values(self.filled, o[0], o[1], self.grid.resolution, float(x), float(y))
+        return core.sample(self.filled, o[0], o[1], self.grid.resolution, float(x), float(y))
 
     def exact(self, x: float, y: float) -> float:
         """Distance to the goal from one point [m], not interpolated; slower than `sample`."""
@@ -142,7 +116,7 @@ def _field(source: GoalDistances, resolution: float) -> GeodesicField:
     grid = Grid.cover(source.static.bounds, resolution)
     values = np.empty(grid.shape)
     sliver = standoff_of(source.static, source.clearance)
-    _fill_distances(values, grid.origin, resolution, source.nodes, source.scene, sliver)
+    source.scene.fill_distances(values, grid.origin, resolution, source.nodes, sliver)
     values[outside_area(source.target, np.stack(np.meshgrid(grid.x, grid.y), axis=-1))] = 0.0
     return GeodesicField(frozen(values), grid, source)
 

@@ -10,8 +10,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pushplan.compiled import kernel
-from pushplan.geometry.obstacles import Obstacles, obstacle_distance, obstacles_of
+from pushplan.geometry.obstacles import core_obstacles
 from pushplan.world import InvalidInputError, StaticMap
 from pushplan.world.checked_fields import CheckedFields, PositiveFloat, Shape
 from pushplan.world.checks import (
@@ -86,17 +85,6 @@ class Grid(ArrayRecord, CheckedFields):
         return row, col
 
 
-@kernel
-def _fill_clearance(
-    out: FloatArray, first: int, last: int, x: FloatArray, y: FloatArray, shapes: Obstacles
-) -> None:
-    """Write the distance [m] to the nearest obstacle at the centres of cells, row by row."""
-    for at in range(first, last):
-        i = at // len(x)
-        j = at % len(x)
-        out[i, j] = obstacle_distance(x[j], y[i], shapes)
-
-
 def clearance_field(
     static: StaticMap, grid: Grid, stopped: Callable[[], bool] = lambda: False
 ) -> FloatArray:
@@ -107,12 +95,13 @@ def clearance_field(
     map are no obstacle. It is left undone where ``stopped``, asked every few milliseconds, says so.
     """
     out = np.empty(grid.shape)
-    shapes = obstacles_of(static)
-    piece = 1 + _PIECE // (1 + len(shapes.radii))
+    shapes = core_obstacles(static)
+    piece = 1 + _PIECE // (1 + len(static.polygons) + len(static.segments))
     for first in range(0, out.size, piece):
         if stopped():
             break
-        _fill_clearance(out, first, min(first + piece, out.size), grid.x, grid.y, shapes)
+        last = min(first + piece, out.size)
+        shapes.fill_clearance(out, first, last, grid.origin, grid.resolution)
     return frozen(out)
 
 

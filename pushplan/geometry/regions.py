@@ -10,8 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pushplan.compiled import kernel
-from pushplan.geometry.contours import segment_crossings
+from pushplan.core import geometry as core
 from pushplan.world import ClearanceArea, Goal, GoalDisc, GoalLine, InvalidInputError, Receptacle
 from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, IntArray, array, frozen
 from pushplan.world.outline import convex_outline, flatten
@@ -28,7 +27,7 @@ Target = Goal | Polygons
 
 
 class Regions(NamedTuple):
-    """A union of discs, half-planes and convex polygons; a plain tuple for kernels."""
+    """A union of discs, half-planes and convex polygons."""
 
     discs: FloatArray  # (D, 3) x, y, radius [m]; a radius of 0 is a point
     # (H, 4) point x, y [m] and unit normal; everything on or beyond the line belongs
@@ -101,67 +100,6 @@ def outside_area(target: Target, points: FloatArray) -> BoolArray:
     return outside
 
 
-@kernel
-def _nearest_in_polygon(
-    x: float, y: float, corners: FloatArray, first: int, last: int
-) -> tuple[float, float]:
-    """Nearest point of a convex polygon or segment; the point itself where it is inside."""
-    inside = last - first > 2
-    best = math.inf
-    bx = x
-    by = y
-    for i in range(first, last):
-        j = i + 1 if i + 1 < last else first
-        ax = corners[i, 0]
-        ay = corners[i, 1]
-        dx = corners[j, 0] - ax
-        dy = corners[j, 1] - ay
-        if dx * (y - ay) - dy * (x - ax) < 0.0:
-            inside = False
-        length_sq = dx * dx + dy * dy
-        t = 0.0
-        if length_sq > 0.0:
-            t = min(1.0, max(0.0, ((x - ax) * dx + (y - ay) * dy) / length_sq))
-        qx = ax + t * dx
-        qy = ay + t * dy
-        d = (qx - x) ** 2 + (qy - y) ** 2
-        if d < best:
-            best = d
-            bx = qx
-            by = qy
-    if inside:
-        return x, y
-    return bx, by
-
-
-@kernel
-def nearest_in_region(k: int, x: float, y: float, regions: Regions) -> tuple[float, float]:
-    """Point of region ``k`` that is nearest to x, y [m]: the point itself if it is inside."""
-    discs = regions.discs.shape[0]
-    lines = regions.lines.shape[0]
-    if k < discs:
-        cx = regions.discs[k, 0]
-        cy = regions.discs[k, 1]
-        radius = regions.discs[k, 2]
-        distance = math.hypot(x - cx, y - cy)
-        if distance <= radius:
-            return x, y
-        fraction = radius / distance
-        return cx + fraction * (x - cx), cy + fraction * (y - cy)
-    k -= discs
-    if k < lines:
-        px = regions.lines[k, 0]
-        py = regions.lines[k, 1]
-        nx = regions.lines[k, 2]
-        ny = regions.lines[k, 3]
-        short = (px - x) * nx + (py - y) * ny
-        if short <= 0.0:
-            return x, y
-        return x + short * nx, y + short * ny
-    k -= lines
-    return _nearest_in_polygon(x, y, regions.corners, regions.offsets[k], regions.offsets[k + 1])
-
-
 def region_crossings(regions: Regions, edges: FloatArray) -> FloatArray:
     """Points (N, 2) [m] where outlines of the regions cross segments (E, 4) [m].
 
@@ -186,9 +124,9 @@ def region_crossings(regions: Regions, edges: FloatArray) -> FloatArray:
     for px, py, nx, ny in regions.lines.tolist():
         span = reach + math.hypot(px, py)
         line = np.array([[px - span * ny, py + span * nx, px + span * ny, py - span * nx]])
-        found.append(segment_crossings(line, edges))
+        found.append(core.segment_crossings(line, edges))
     for i in range(len(regions.offsets) - 1):
         loop = regions.corners[regions.offsets[i] : regions.offsets[i + 1]]
         sides = np.ascontiguousarray(np.hstack([loop, np.roll(loop, -1, axis=0)]))
-        found.append(segment_crossings(sides, edges))
+        found.append(core.segment_crossings(sides, edges))
     return np.ascontiguousarray(np.concatenate(found))

@@ -6,23 +6,21 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pushplan.compiled import kernel, owned
+from pushplan.core import geometry as core
 from pushplan.geometry.contours import (
     Contours,
     box_edges,
     contour_edges,
     contours_of,
-    free_points,
     gap_of,
-    segment_crossings,
     standoff_of,
 )
-from pushplan.geometry.obstacles import Obstacles, line_of_sight, obstacle_distance, obstacles_of
+from pushplan.geometry.obstacles import Obstacles, core_obstacles, obstacles_of
 from pushplan.geometry.regions import (
     Regions,
     Target,
@@ -31,18 +29,13 @@ from pushplan.geometry.regions import (
     region_crossings,
     regions_of,
 )
-from pushplan.geometry.visibility import (
-    GOAL_LEG,
-    NO_LEG,
-    GoalScene,
-    Nodes,
-    goal_leg,
-    node_leg,
-    relax,
-    visible_pairs,
-)
 from pushplan.world import Goal, StaticMap
 from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, array, frozen, number
+
+NO_LEG = -2
+"""Node index of a place from which nothing can be seen."""
+GOAL_LEG = -1
+"""Node index of a place from which the goal itself is the next stop."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,12 +65,12 @@ class _Graph(NamedTuple):
 
 @lru_cache(maxsize=32)
 def _graph_of(static: StaticMap, clearance: float) -> _Graph:
-    shapes = obstacles_of(static, clearance)
+    shapes = core_obstacles(static, clearance)
     gap = gap_of(static)
     every = contours_of(static, clearance)
-    keep = free_points(owned(every.corners), shapes, static.bounds, gap)
+    keep = shapes.free_points(every.corners, static.bounds, gap)
     kept = Contours(*(frozen(np.ascontiguousarray(values[keep])) for values in every))
-    pairs, lengths = visible_pairs(kept.corners, kept.incoming, kept.outgoing, shapes, gap)
+    pairs, lengths = core.visible_pairs(kept.bends, shapes, gap)
     tails = np.concatenate([pairs[:, 0], pairs[:, 1]])
     heads = np.concatenate([pairs[:, 1], pairs[:, 0]])
     order = np.argsort(tails, kind="stable")
@@ -94,17 +87,8 @@ def bends_of(static: StaticMap, clearance: float = 0.0) -> tuple[Contours, Float
     for k in range(count):
         between[k, k] = 0.0
         unused = np.full(count, GOAL_LEG, dtype=np.int64)
-        relax(between[k], unused, graph.starts, graph.ends, graph.lengths)
+        core.relax(graph.starts, graph.ends, graph.lengths, between[k], unused)
     return graph.contours, frozen(between)
-
-
-@kernel(allocates=True)
-def _first_legs(points: FloatArray, scene: GoalScene) -> FloatArray:
-    """Distance to the goal and nearest goal point for each point (N, 2) that sees it."""
-    out = np.empty((points.shape[0], 3))
-    for i in range(points.shape[0]):
-        out[i, 0], out[i, 1], out[i, 2] = goal_leg(points[i, 0], points[i, 1], scene)
-    return out
 
 
 def with_way_out(
@@ -131,9 +115,10 @@ class GoalDistances:
         static: the map.
         clearance: distance of paths from obstacles [m].
         target: the goal.
-        regions: where paths to it end.
-        obstacles: the obstacles grown by the clearance.
+        to_center: True if distances to a disc are those to its centre.
+        scene: where paths to it end, and the obstacles grown by the clearance.
         nodes: bends, sorted by distance.
+        places: (V, 2) where they are [m].
         parents: (V,) the next bend towards the goal, or `GOAL_LEG`.
         exits: (V, 2) where the leg to the goal ends [m], for nodes whose parent is `GOAL_LEG`.
     """
@@ -141,9 +126,10 @@ class GoalDistances:
     static: StaticMap
     clearance: float
     target: Target
-    regions: Regions
-    obstacles: Obstacles
-    nodes: Nodes
+    to_center: bool
+    scene: core.GoalScene
+    nodes: core.Nodes
+    places: FloatArray
     parents: IntArray
     exits: FloatArray
 
@@ -152,10 +138,9 @@ class GoalDistances:
         """Distance of paths to the grown obstacles [m]."""
         return gap_of(self.static)
 
-    @property
-    def scene(self) -> GoalScene:
-        """Goal and obstacles as the kernels read them."""
-        return GoalScene(self.regions, self.obstacles, self.static.bounds, self.gap)
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy is made anew, as objects of the core cannot be pickled."""
+        return _distances, (self.static, self.clearance, self.target, self.to_center)
 
     def path_from(self, start: ArrayLike) -> Path:
         """The shortest path from a point (2,) [m] to the goal."""
@@ -169,18 +154,18 @@ class GoalDistances:
 
     def _from_free(self, start: FloatArray) -> tuple[float, list[FloatArray]]:
         x, y = start.tolist()
-        length, qx, qy = goal_leg(x, y, self.scene)
+        length, qx, qy = self.scene.goal_leg(x, y)
         if length == 0.0:
             return 0.0, [start]
-        over, node = node_leg(x, y, length, -1, False, self.nodes, self.obstacles, self.gap)
+        over, node = self.scene.node_leg(x, y, length, NO_LEG, False, self.nodes)
         if node == NO_LEG:
             return length, [start, np.array([qx, qy])]
         points = [start]
         while node != GOAL_LEG:
-            points.append(self.nodes.points[node])
+            points.append(self.places[node])
             last = node
             node = int(self.parents[node])
-        if (self.exits[last] != self.nodes.points[last]).any():
+        if (self.exits[last] != self.places[last]).any():
             points.append(self.exits[last])
         return over, points
 
@@ -191,22 +176,22 @@ def _distances(
 ) -> GoalDistances:
     regions = regions_of(target, to_center=to_center)
     graph = _graph_of(static, clearance)
-    shapes = obstacles_of(static, clearance)
+    shapes = core_obstacles(static, clearance)
     gap = gap_of(static)
     ends = ends_on_rims(static, clearance, regions)
     corners = graph.contours
     count = len(corners.corners)
-    scene = GoalScene(regions, shapes, static.bounds, gap)
-    legs = _first_legs(corners.corners, scene)
+    scene = core.GoalScene(core.Regions(*regions), shapes, static.bounds, gap)
+    legs = scene.goal_legs(corners.corners)
     discs = np.hstack([ends, np.zeros((len(ends), 1))])
     none = np.zeros((0, 4)), np.zeros((0, 2)), np.zeros(1, dtype=np.int64)
-    rims = _first_legs(
-        corners.corners, scene._replace(regions=Regions(*map(frozen, (discs, *none))))
+    rims = core.GoalScene(core.Regions(discs, *none), shapes, static.bounds, gap).goal_legs(
+        corners.corners
     )
     legs = np.where((rims[:, 0] < legs[:, 0])[:, None], rims, legs)
     distances = legs[:, 0].copy()
     parents = np.full(count, GOAL_LEG, dtype=np.int64)
-    relax(distances, parents, graph.starts, graph.ends, graph.lengths)
+    core.relax(graph.starts, graph.ends, graph.lengths, distances, parents)
     zeros = np.zeros((len(ends), 2))
     distances = np.concatenate([distances, np.zeros(len(ends))])
     order = np.argsort(distances, kind="stable")
@@ -214,16 +199,13 @@ def _distances(
     rank = np.full(len(distances) + 1, GOAL_LEG, dtype=np.int64)  # the last entry serves GOAL_LEG
     rank[order] = np.arange(len(order))
     parents = np.concatenate([parents, np.full(len(ends), GOAL_LEG, dtype=np.int64)])
-    columns = (
-        np.concatenate([corners.corners, ends]),
-        np.concatenate([corners.incoming, zeros]),
-        np.concatenate([corners.outgoing, zeros]),
-        distances,
-    )
-    nodes = Nodes(*(frozen(np.ascontiguousarray(values[order])) for values in columns))
+    places = frozen(np.concatenate([corners.corners, ends])[order])
+    incoming = np.concatenate([corners.incoming, zeros])[order]
+    outgoing = np.concatenate([corners.outgoing, zeros])[order]
+    nodes = core.Nodes(core.Bends(places, incoming, outgoing), distances[order])
     exits = np.concatenate([legs[:, 1:], ends])[order]
     ways = rank[parents[order]]
-    return GoalDistances(static, clearance, target, regions, shapes, nodes, ways, exits)
+    return GoalDistances(static, clearance, target, to_center, scene, nodes, places, ways, exits)
 
 
 def ends_on_rims(static: StaticMap, clearance: float, regions: Regions) -> FloatArray:
@@ -240,7 +222,8 @@ def ends_on_rims(static: StaticMap, clearance: float, regions: Regions) -> Float
         which = near[contours.owner]
     rims = [contour_edges(contours, which), box_edges(static.bounds)]
     ends = region_crossings(regions, np.concatenate(rims))
-    return ends[free_points(ends, shapes, static.bounds, gap_of(static))]
+    free = core_obstacles(static, clearance).free_points(ends, static.bounds, gap_of(static))
+    return ends[free]
 
 
 def goal_distances(
@@ -275,12 +258,13 @@ def leave_inflation(static: StaticMap, clearance: float, point: FloatArray) -> F
     """
     x, y = point.tolist()
     gap = gap_of(static)
-    raw = obstacles_of(static)
-    grown = obstacles_of(static, clearance)
-    if obstacle_distance(x, y, raw) < -gap:
+    raw = core_obstacles(static)
+    around = core_obstacles(static, clearance)
+    if raw.distance(x, y) < -gap:
         return None
-    if obstacle_distance(x, y, grown) >= gap:
+    if around.distance(x, y) >= gap:
         return point
+    grown = obstacles_of(static, clearance)
     away = np.maximum(np.maximum(grown.boxes[:, :2] - point, point - grown.boxes[:, 2:]), 0.0)
     distances = np.hypot(away[:, 0], away[:, 1])
     reach = 2.0 * float(grown.radii.max()) + gap
@@ -288,11 +272,11 @@ def leave_inflation(static: StaticMap, clearance: float, point: FloatArray) -> F
         near = np.flatnonzero(distances <= reach)
         found = [_ways_out(static, clearance, near), _pushed_out(point, grown, near, 2.0 * gap)]
         places = np.ascontiguousarray(np.concatenate(found))
-        places = places[free_points(places, grown, static.bounds, gap)]
+        places = places[around.free_points(places, static.bounds, gap)]
         steps = np.hypot(*(places - point).T)
         for i in np.argsort(steps, kind="stable").tolist():
             px, py = places[i].tolist()
-            if steps[i] <= reach and line_of_sight(x, y, px, py, raw, -2.0 * gap):
+            if steps[i] <= reach and raw.line_of_sight(x, y, px, py, -2.0 * gap):
                 place: FloatArray = places[i]
                 return place
         if len(near) == len(distances) and not (steps > reach).any():
@@ -306,8 +290,8 @@ def _ways_out(static: StaticMap, clearance: float, near: IntArray) -> FloatArray
     which = np.isin(contours.owner, near)
     edges = contour_edges(contours, which)
     owner = contours.owner[which]
-    found = [segment_crossings(box_edges(static.bounds), edges)]
-    found += [segment_crossings(edges[owner == k], edges[owner > k]) for k in near.tolist()]
+    found = [core.segment_crossings(box_edges(static.bounds), edges)]
+    found += [core.segment_crossings(edges[owner == k], edges[owner > k]) for k in near.tolist()]
     return np.ascontiguousarray(np.concatenate(found))
 
 

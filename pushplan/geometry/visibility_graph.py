@@ -5,32 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pushplan.compiled import owned
+from pushplan.core import geometry as core
 from pushplan.geometry.contours import contours_of, gap_of, prepare_contours, standoff_of
-from pushplan.geometry.obstacle_grid import obstacle_grid
-from pushplan.geometry.obstacles import obstacles_of
+from pushplan.geometry.obstacles import core_obstacles, obstacles_of
 from pushplan.geometry.regions import Target, as_target, outside_area, regions_of
 from pushplan.geometry.shortest_path import Path, ends_on_rims, leave_inflation, with_way_out
-from pushplan.geometry.visibility import GoalScene
-from pushplan.geometry.visibility_search import (
-    EXHAUSTED,
-    FULL,
-    PAUSED,
-    START,
-    Corners,
-    VisibilitySearch,
-    bounds_by_obstacle,
-    expand,
-    new_frontier,
-    path_found,
-    search_on,
-)
 from pushplan.world import Goal, StaticMap
-from pushplan.world.checks import FloatArray, array, frozen, number
+from pushplan.world.checks import FloatArray, IntArray, array, number
 
 _BUDGET = 20_000  # work of a search between two looks at a stop rule: about a millisecond
 
@@ -90,57 +76,68 @@ class VisibilityGraph:
     def _search(
         self, origin: FloatArray, free: FloatArray, target: Target, stopped: Callable[[], bool]
     ) -> Path:
-        search = _visibility_search(self.static, self.clearance, target, free)
-        frontier = new_frontier(8 * len(search.done) + 64)
-        expand(search, frontier, START, 0.0, -math.inf)
-        outcome = PAUSED
-        while outcome in (PAUSED, FULL):
+        static = self.static
+        clearance = self.clearance
+        gap = gap_of(static)
+        regions = regions_of(target)
+        around = core_obstacles(static, clearance)
+        scene = core.GoalScene(core.Regions(*regions), around, static.bounds, gap)
+        contours = contours_of(static, clearance)
+        points = np.concatenate([contours.corners, ends_on_rims(static, clearance, regions)])
+        search = core.VisibilitySearch(
+            free,
+            core.Corners(
+                points,
+                contours.incoming,
+                contours.outgoing,
+                contours.owner,
+                *_boxes_of(static, clearance),
+            ),
+            scene,
+            _obstacle_grid(static, clearance),
+            standoff_of(static, clearance),
+        )
+        outcome = core.SearchOutcome.PAUSED
+        while outcome == core.SearchOutcome.PAUSED:
             if stopped():
                 return Path(math.inf)
-            outcome = search_on(search, frontier, _BUDGET)
-            if outcome == FULL:
-                frontier = frontier.larger()
-        if outcome == EXHAUSTED:
+            outcome = search.run(_BUDGET)
+        if outcome == core.SearchOutcome.EXHAUSTED:
             return Path(math.inf)
-        return with_way_out(origin, free, gap_of(self.static), path_found(search))
+        path = [free]
+        parents = search.parents
+        at = search.end
+        while at >= 0:
+            path.insert(1, points[at])
+            at = int(parents[at])
+        length = 0.0
+        exits = []
+        if search.end < len(contours.corners):  # it goes on into the goal
+            length, x, y = scene.goal_leg(*path[-1].tolist())
+            if length > 0.0:
+                exits.append(np.array([x, y]))
+        for there, here in pairwise(path[::-1]):
+            length += math.hypot(*(there - here))
+        return with_way_out(origin, free, gap, (length, path + exits))
 
 
 @lru_cache(maxsize=32)
-def _corners_of(static: StaticMap, clearance: float) -> Corners:
-    """The corners of all contours, without ends."""
+def _boxes_of(static: StaticMap, clearance: float) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Boxes around the contours.
+
+    Returns:
+        (C + 1,) where the corners of each contour start, (C, 2) the middles of the boxes [m], and
+        (C, 2) half their sides [m].
+    """
     contours = contours_of(static, clearance)
     points = contours.corners
     count = len(obstacles_of(static, clearance).radii)
     first = np.searchsorted(contours.owner, np.arange(count + 1)).astype(np.int64)
     low = np.minimum.reduceat(points, first[:-1]) if count else points
     high = np.maximum.reduceat(points, first[:-1]) if count else points
-    return Corners(
-        *(points, contours.incoming, contours.outgoing, contours.owner, frozen(first)),
-        frozen(0.5 * (low + high)),
-        frozen(0.5 * (high - low)),
-    )
+    return first, 0.5 * (low + high), 0.5 * (high - low)
 
 
-def _visibility_search(
-    static: StaticMap, clearance: float, target: Target, start: FloatArray
-) -> VisibilitySearch:
-    """A search that knows nothing yet but the map and where it begins and ends."""
-    regions = regions_of(target)
-    gap = gap_of(static)
-    shapes = obstacles_of(static, clearance)
-    corners = _corners_of(static, clearance)
-    ends = ends_on_rims(static, clearance, regions)
-    points = np.concatenate([corners.points, ends])
-    scene = GoalScene(regions, shapes, static.bounds, gap)
-    return VisibilitySearch(
-        start=owned(start),
-        corners=corners._replace(points=points),
-        scene=scene,
-        grid=obstacle_grid(static, clearance, gap),
-        sliver=standoff_of(static, clearance),
-        done=np.zeros(len(points), dtype=np.bool_),
-        parents=np.full(len(points), START, dtype=np.int64),
-        counters=np.array([0, 0, 0, START]),
-        seen=np.zeros(len(shapes.radii) + 1, dtype=np.int64),
-        left=bounds_by_obstacle(corners, scene),
-    )
+@lru_cache(maxsize=32)
+def _obstacle_grid(static: StaticMap, clearance: float) -> core.ObstacleGrid:
+    return core.ObstacleGrid(core_obstacles(static, clearance), gap_of(static))

@@ -8,7 +8,6 @@ from typing import Annotated, Protocol, runtime_checkable
 
 from numpy.typing import ArrayLike
 
-from pushplan.compiled import owned
 from pushplan.world import InvalidInputError, World
 from pushplan.world.checked_fields import CheckedFields, Limits, Shape
 from pushplan.world.checks import ArrayRecord, FloatArray, array
@@ -16,12 +15,12 @@ from pushplan.world.polyline import path_lengths
 
 
 def checked_path(path: ArrayLike) -> FloatArray:
-    """Poses (N, 3) that a robot is swept through, as kernels read them.
+    """Poses (N, 3) that a robot is swept through.
 
     Raises:
         InvalidInputError: if the path is not (N, 3), empty, or not finite.
     """
-    poses: FloatArray = owned(array("path", path, (None, 3)))
+    poses: FloatArray = array("path", path, (None, 3))
     if len(poses) == 0:
         raise InvalidInputError("path must hold at least one pose, got none")
     return poses

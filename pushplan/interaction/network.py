@@ -17,8 +17,8 @@ from pushplan.interaction.occupancy import (
     PATCH_CELLS,
     OccupancyForecast,
     PassageBatch,
+    Patch,
 )
-from pushplan.interaction.occupancy_kernels import Patch
 from pushplan.world.checks import FloatArray, integer
 
 SHIPPED = "ice_network.onnx"

@@ -14,16 +14,17 @@ from dataclasses import dataclass
 from typing import Annotated, Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from pushplan.compiled import owned
+from pushplan.core import interaction as core
 from pushplan.errors import InvalidInputError
-from pushplan.interaction.occupancy_kernels import Patch, cover_objects, cover_sweep
 from pushplan.world import Movables, World
 from pushplan.world.checked_fields import CheckedFields, PositiveFloat, Shape
 from pushplan.world.checks import ArrayRecord, FloatArray, array
 from pushplan.world.outline import next_corner
 
+Patch = NDArray[np.float32]
+"""Covered fractions of cells."""
 PATCH_CELLS = 40
 """Cells along each side of a patch."""
 CELLS_PER_LENGTH = 10
@@ -62,7 +63,7 @@ class PassageBatch(CheckedFields):
     patches: Annotated[Patch, Shape("B", len(CHANNELS), PATCH_CELLS, PATCH_CELLS)]
     cell: PositiveFloat  # side of a cell [m]
     density: PositiveFloat = 1.0  # mass over area of the objects [kg/m²]
-    # (B, 3) where each patch lies, as in `occupancy_kernels`; None where the patches come from a
+    # (B, 3) where each patch lies, as in `patch_frame`; None where the patches come from a
     # map and predictors that need none are asked
     frames: Annotated[FloatArray, Shape("B", 3)] | None = None
     # the worlds, for predictors that follow single objects; () where there are none
@@ -139,7 +140,8 @@ def patch_frame(
     """The frame of the patch around a passage, about the middle between its two ends.
 
     Returns:
-        (3,) as in `occupancy_kernels`. The corner lies on a grid of cells
+        (3,) world position [m] of the outer corner of cell (0, 0), and the heading [rad] in which
+        columns count up; rows count up to the left of it. The corner lies on a grid of cells
         about the world's origin, so that patches of one world share their cells.
     """
     right = ahead - 0.5 * math.pi
@@ -174,10 +176,9 @@ def make_batch(passages: Sequence[Passage], *, ahead: float = 0.5 * math.pi) -> 
         movables = passage.world.movables
         robot = passage.world.robot
         _cover(movables, movables.poses, frames[i], cell, patches[i, 0])
-        hull = (owned(robot.vertices), owned(robot.offsets))
-        path = owned(passage.path)
-        cover_sweep(path[:1], *hull, frames[i], cell, patches[i, 1])
-        cover_sweep(path, *hull, frames[i], cell, patches[i, 2])
+        hull = (robot.vertices, robot.offsets, frames[i], cell)
+        core.cover_sweep(passage.path[:1], *hull, patches[i, 1])
+        core.cover_sweep(passage.path, *hull, patches[i, 2])
     return PassageBatch(patches, cell, ice_density(first), frames, tuple(passages))
 
 
@@ -195,5 +196,4 @@ def patch_after(batch: PassageBatch, index: int, poses: ArrayLike) -> Patch:
 def _cover(
     objects: Movables, poses: FloatArray, frame: FloatArray, cell: float, out: Patch
 ) -> None:
-    shapes = (owned(objects.vertices), owned(objects.offsets))
-    cover_objects(owned(poses), *shapes, owned(frame), cell, out)
+    core.cover_objects(poses, objects.vertices, objects.offsets, frame, cell, out)

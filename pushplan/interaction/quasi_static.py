@@ -1,4 +1,4 @@
-"""The default interaction model: quasi-static pushing, compiled."""
+"""The default interaction model: quasi-static pushing."""
 
 from __future__ import annotations
 
@@ -10,18 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pushplan.compiled import kernel, owned
+from pushplan.core import interaction as core
 from pushplan.geometry import polygon_inertia
-from pushplan.interaction.advance import advance_objects
 from pushplan.interaction.interaction_model import Interaction, checked_path
-from pushplan.interaction.kernels import (
-    Bodies,
-    Scratch,
-    Settings,
-    advance,
-    make_scratch,
-    sweep_path,
-)
 from pushplan.world import Movables, RobotModel, StaticMap, World
 from pushplan.world.checked_fields import (
     CheckedFields,
@@ -30,7 +21,7 @@ from pushplan.world.checked_fields import (
     PositiveFraction,
     PositiveInt,
 )
-from pushplan.world.checks import FloatArray, IntArray
+from pushplan.world.checks import FloatArray, frozen
 from pushplan.world.outline import flatten, outline_boxes, unflatten
 
 _TOLERANCE = 1e-3  # overlap that counts as resolved [sizes of the thinnest body]
@@ -38,32 +29,15 @@ _MOST_SLENDER = 30.0
 """A body that is thinner than the robot by more sets no finer steps, which would take forever."""
 
 
-class QuasiStaticContacts(NamedTuple):
-    """`QuasiStatic` in compiled form, with memory for one thread."""
+class Settings(NamedTuple):
+    """Numerical settings of the core's `QuasiStatic`."""
 
-    inverse_masses: FloatArray  # (K,)
-    radii: FloatArray  # (K,) circumscribed radii [m]
-    tests: IntArray  # (1,) pairs of outlines that were tested so far
-    bodies: Bodies
-    settings: Settings
-    scratch: Scratch
-
-
-@kernel
-def _step(
-    model: QuasiStaticContacts,
-    robot_from: FloatArray,
-    robot_to: FloatArray,
-    poses: FloatArray,
-    moved: FloatArray,
-) -> bool:
-    """Drive the robot a step by the contact kernels."""
-    return bool(
-        advance(robot_from, robot_to, poses, moved, model.bodies, model.settings, model.scratch)
-    )
-
-
-advance_objects.add(QuasiStaticContacts, _step)
+    max_step: float  # Longest motion of a robot corner in one resolution step [m]
+    tolerance: float  # Overlap that counts as resolved [m]
+    jam_depth: float  # Overlap that cannot be resolved and counts as a jam [m]
+    iterations: int  # Gauss-Seidel rounds in one step
+    friction: float  # Coulomb coefficient between robot and objects
+    static_friction: float  # Coulomb coefficient between objects and walls
 
 
 @dataclass(frozen=True)
@@ -96,8 +70,8 @@ class QuasiStatic(CheckedFields):
     iterations: PositiveInt = 12
     static_friction: NonNegativeFloat = 0.0
 
-    def bodies(self, world: World) -> Bodies:
-        """The world's shapes as the compiled kernels read them; cached."""
+    def bodies(self, world: World) -> core.Bodies:
+        """The world's shapes as the core reads them; cached."""
         return _bodies(world.robot, _Shapes(world.movables), world.static, self.gyration_scale)
 
     def settings(self, world: World) -> Settings:
@@ -112,26 +86,17 @@ class QuasiStatic(CheckedFields):
             static_friction=float(self.static_friction),
         )
 
-    def compiled(self, world: World) -> QuasiStaticContacts:
-        """The model as `pushplan.interaction.advance.advance_objects` takes it."""
-        bodies = self.bodies(world)
-        scratch = make_scratch(bodies)
-        return QuasiStaticContacts(
-            bodies.inverse_masses,
-            bodies.radii,
-            scratch.tests,
-            bodies,
-            self.settings(world),
-            scratch,
-        )
+    def compiled(self, world: World) -> core.QuasiStatic:
+        """The model for the shapes of this world, as `CompiledInteraction` has it."""
+        return core.QuasiStatic(self.bodies(world), *self.settings(world))
 
     def sweep(self, world: World, path: ArrayLike) -> Interaction:
         """Predict the motion of every object; see `InteractionModel.sweep`."""
         robot_path = checked_path(path)
         poses = world.movables.poses.copy()
         out = np.empty((len(robot_path), len(poses), 3))
-        jammed = sweep_path(robot_path, poses, self.bodies(world), self.settings(world), out)
-        return Interaction(out, world.movables.masses, int(jammed))
+        jammed = self.compiled(world).sweep(robot_path, poses, out)
+        return Interaction(out, world.movables.masses, jammed)
 
 
 class _Shapes:
@@ -174,21 +139,33 @@ def _width(outlines: FloatArray) -> float:
 
 
 @functools.lru_cache(maxsize=32)
-def _bodies(robot: RobotModel, shapes: _Shapes, static: StaticMap, gyration: float) -> Bodies:
+def _gyration(shapes: _Shapes) -> FloatArray:
+    """(K,) c² of the objects at a scale of 1 [m²]."""
     movables = shapes.movables
     squares = [polygon_inertia(movables.drawn_outline(k)) for k in range(len(movables))]
+    return frozen(np.array(squares, dtype=np.float64))
+
+
+def inverse_gyration(movables: Movables) -> FloatArray:
+    """(K,) inertia of the objects over their masses, inverted [1/m²]."""
+    return 1.0 / _gyration(_Shapes(movables))
+
+
+@functools.lru_cache(maxsize=32)
+def _bodies(robot: RobotModel, shapes: _Shapes, static: StaticMap, gyration: float) -> core.Bodies:
+    movables = shapes.movables
     vertices, offsets = flatten(static.convex_parts)
-    return Bodies(
-        robot_vertices=owned(robot.vertices),
-        robot_offsets=owned(robot.offsets),
+    return core.Bodies(
+        robot_vertices=robot.vertices,
+        robot_offsets=robot.offsets,
         wall_parts=len(robot.wall_parts),
         robot_radius=robot.circumscribed_radius,
-        vertices=owned(movables.vertices),
-        offsets=owned(movables.offsets),
-        radii=owned(movables.radii),
+        vertices=movables.vertices,
+        offsets=movables.offsets,
+        radii=movables.radii,
         inverse_masses=1.0 / movables.masses,
-        inverse_gyration=1.0 / (np.array(squares, dtype=np.float64) * gyration**2),
-        static_vertices=owned(vertices),
-        static_offsets=owned(offsets),
-        static_boxes=outline_boxes(vertices, offsets),
+        inverse_gyration=1.0 / (_gyration(shapes) * gyration**2),
+        wall_vertices=vertices,
+        wall_offsets=offsets,
+        wall_boxes=outline_boxes(vertices, offsets),
     )

@@ -10,7 +10,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from pushplan.compiled import kernel
+from pushplan.core import learned as core
 from pushplan.geometry import GoalDistances, goal_distances
 from pushplan.geometry.transforms import transform_outlines
 from pushplan.observation.builder import LimitedVector
@@ -18,50 +18,6 @@ from pushplan.world import Goal, GoalDisc, GoalLine, StaticMap, World
 from pushplan.world.checked_fields import CheckedFields, Limits, PositiveFloat
 from pushplan.world.checks import FloatArray, IntArray, frozen
 from pushplan.world.outline import centroid, flatten
-
-
-@kernel(allocates=True)
-def cast_rays(
-    out: FloatArray,  # (N,) lengths [m], ray i at heading + 2 pi i / N; shortened
-    x: float,  # their start [m]
-    y: float,  # [m]
-    heading: float,  # of the first [rad]
-    vertices: FloatArray,  # (V, 2) corners of closed outlines, world frame [m]
-    offsets: IntArray,  # (P + 1,) where each outline starts
-) -> None:
-    """Shorten rays to where they first cross an outline."""
-    count = out.shape[0]
-    reach = np.max(out)
-    step = 2.0 * np.pi / count
-    for k in range(offsets.shape[0] - 1):
-        first = offsets[k]
-        end = offsets[k + 1]
-        for i in range(first, end):
-            j = i + 1 if i + 1 < end else first
-            ax = vertices[i, 0] - x
-            ay = vertices[i, 1] - y
-            bx = vertices[j, 0] - x
-            by = vertices[j, 1] - y
-            ex = bx - ax
-            ey = by - ay
-            # most edges are out of reach: (reach + edge)² is at most 2 (reach² + edge²)
-            if ax * ax + ay * ay > 2.0 * (reach * reach + ex * ex + ey * ey):
-                continue
-            # only the rays between the bearings of the two ends can cross the edge
-            turn = np.arctan2(ax * by - ay * bx, ax * bx + ay * by)
-            low = np.arctan2(ay, ax) if turn >= 0.0 else np.arctan2(by, bx)
-            start = int(np.ceil((low - heading) / step - 1e-9))
-            last = int(np.floor((low + abs(turn) - heading) / step + 1e-9))
-            for n in range(start, last + 1):
-                c = np.cos(heading + n * step)
-                s = np.sin(heading + n * step)
-                across = c * ey - s * ex
-                if abs(across) < 1e-15:
-                    continue
-                away = (ax * ey - ay * ex) / across
-                if 0.0 <= away < out[n % count]:
-                    out[n % count] = away
-
 
 _GUIDE = 10
 _EACH = 9
@@ -122,7 +78,7 @@ class FeatureObservation(LimitedVector, CheckedFields):
                 rays, (_walls(world.static), (frozen(corners), objects.offsets)), strict=True
             ):
                 lengths = np.full(self.rays, self.range)
-                cast_rays(lengths, x, y, theta, *outlines)
+                core.cast_rays(lengths, x, y, theta, *outlines)
                 row[:] = 1.0 - lengths / self.range
         if self.objects and len(world.movables):
             self._nearest(out[_GUIDE + 2 * self.rays :].reshape(-1, _EACH), world, to_body)

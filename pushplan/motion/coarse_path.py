@@ -7,43 +7,16 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from pushplan.compiled import kernel
-from pushplan.geometry import core_distance
+from pushplan.core import motion as core
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.time_slicing import never
 from pushplan.search.grid_dijkstra import grid_dijkstra
 from pushplan.world import GoalDisc, StaticMap, World
-from pushplan.world.checks import FloatArray, IntArray, frozen
+from pushplan.world.checks import FloatArray, frozen
 from pushplan.world.outline import flatten, outline_boxes, unflatten
 
 _SIDE = 96  # cells along the longer side of the workspace, if that resolves the robot's own width
 _MOST = 400  # cells along the longer side at most
-
-
-@kernel(allocates=True)
-def _cell_weights(
-    origin: FloatArray,
-    cell: float,
-    rows: int,
-    cols: int,
-    vertices: FloatArray,
-    offsets: IntArray,
-    within: IntArray,  # (K, 4) first column, first row, last column, last row of each polygon
-    reach: FloatArray,
-    weight: FloatArray,
-) -> FloatArray:
-    """Extra cost per metre of each cell: weights of polygons, fading to 0 at their reach."""
-    extra = np.zeros((rows, cols))
-    for k in range(offsets.shape[0] - 1):
-        far = reach[k]
-        for r in range(max(within[k, 1], 0), min(within[k, 3] + 1, rows)):
-            for c in range(max(within[k, 0], 0), min(within[k, 2] + 1, cols)):
-                x = origin[0] + (c + 0.5) * cell
-                y = origin[1] + (r + 0.5) * cell
-                gap = max(core_distance(x, y, vertices, offsets[k], offsets[k + 1]), 0.0)
-                if gap < far:
-                    extra[r, c] += weight[k] * (1.0 - gap / far)
-    return extra
 
 
 def _cell(world: World) -> float:
@@ -120,7 +93,10 @@ def _grid_weights(
     vertices, offsets = flatten(shapes)
     boxes = outline_boxes(vertices, offsets) + reach[:, None] * [-1.0, -1.0, 1.0, 1.0]
     within = ((boxes - np.tile(bounds[:2], 2)) / cell).astype(np.int64)
-    return _cell_weights(bounds[:2], cell, rows, cols, vertices, offsets, within, reach, weight)
+    extra = np.zeros((rows, cols))
+    x, y = bounds[:2]
+    core.fill_cell_weights(extra, x, y, cell, vertices, offsets, within, reach, weight)
+    return extra
 
 
 def _cheapest(

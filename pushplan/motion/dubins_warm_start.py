@@ -10,9 +10,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pushplan.compiled import owned
+from pushplan.core import motion as core
 from pushplan.geometry import VisibilityGraph
-from pushplan.motion.dubins import dubins
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_improver import PathImprover
 from pushplan.motion.path_search_config import EDGE, INSET
@@ -36,12 +35,11 @@ def is_far(improver: PathImprover) -> bool:
 
 def warm_start(improver: PathImprover) -> None:
     """Try to drive along the shortest homotopic path, objects or not; the improver keeps it."""
-    problem = improver.problem
     size = improver.size
     depth = 1.01 * INSET * size
     if isinstance(improver.goal, GoalDisc):
-        depth = improver.goal.radius - 0.99 * float(problem.goal[3])
-    radius = problem.turning_radius
+        depth = improver.goal.radius - 0.99 * float(improver.room.goal[3])
+    radius = improver.turning_radius
     wide = max(_WIDE * size, _BEYOND_RADIUS * radius)
     for clearance in (wide, _NARROW * size):
         if improver.stopped():
@@ -73,9 +71,9 @@ def warm_start_arcs(
         return None
     vias = _vias(corners, radius, depth)
     arcs = np.empty((3 * len(vias), 2))
-    here = owned(world.robot_pose)
+    here = world.robot_pose
     for i, there in enumerate(vias):
-        dubins(here, there, radius, arcs[3 * i : 3 * i + 3])
+        core.dubins(here, there, radius, arcs[3 * i : 3 * i + 3])
         here = there
     return arcs
 

@@ -8,15 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pushplan.compiled import owned
+from pushplan.core import motion as core
 from pushplan.interaction import InteractionModel
-from pushplan.interaction.swept_step import SweptContacts, compile_interaction
-from pushplan.motion.arc_rollout import lay_out, sweep_cost
-from pushplan.motion.collision import first_blocked, footprint, obstacles
-from pushplan.motion.dubins import step_along
+from pushplan.interaction.compiled_model import SweptModel, compile_interaction
+from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.goal_region import goal_numbers
 from pushplan.motion.keep_out import keep_out
-from pushplan.motion.path_problem import PathProblem, SweptPath, make_swept_path
 from pushplan.motion.path_search_config import (
     BATCH,
     INSET,
@@ -25,8 +22,8 @@ from pushplan.motion.path_search_config import (
     PathSearchConfig,
 )
 from pushplan.motion.room_ahead import Room
-from pushplan.motion.shortcutting import shortcut
 from pushplan.motion.speed_profile import TIGHTEST, goal_is_outside, start_margin, timed_plan
+from pushplan.motion.swept_path import SweptPath, make_swept_path
 from pushplan.motion.time_slicing import Pace
 from pushplan.world import Drive, PlanResult, PlanStatus
 from pushplan.world.checks import FloatArray
@@ -47,7 +44,7 @@ class Candidate:
     """A path that is being shortcut, with the memory for it."""
 
     path: SweptPath
-    trial: SweptPath
+    trial: core.SweptPath
     count: int
     cost: float
 
@@ -55,7 +52,10 @@ class Candidate:
 class Lead(NamedTuple):
     """Motion with which every path of a search begins, before the search itself."""
 
-    pieces: FloatArray  # (E, 2) arcs from the robot's pose on, as in `pushplan.motion.dubins`
+    pieces: FloatArray
+    """(E, 2) length [m] and curvature [1/m] of arcs from the robot's pose on.
+
+    A turn on the spot has an infinite curvature and an angle [rad] for its length."""
     pose: FloatArray  # (3,) where the search begins
     objects: FloatArray  # (K, 3) poses of the objects by then
 
@@ -80,22 +80,17 @@ class PathImprover:
         self.tight = False
         self.backward = 0.0
         """Greatest distance by which paths of trees may lead back [m]."""
-        self.lead = self._no_lead = Lead(
-            np.empty((0, 2)), owned(world.robot_pose), owned(world.movables.poses)
-        )
+        self.lead = self._no_lead = Lead(np.empty((0, 2)), world.robot_pose, world.movables.poses)
         self.best_cost = np.inf
         self.first_solution_s = float("nan")
-        self.problem = PathProblem(
-            robot_mass=world.robot.mass,
-            push_weight=float(config.push_weight),
-            turning_radius=turning_radius,
-            spacing=SPACING * self.size,
-            jam_length=self._jam_length(),
-            displacement=1.5 * self.size,
-            goal=goal_numbers(self.goal, INSET * self.size),
-            footprint=footprint(world.robot),
-            walls=obstacles(keep_out(world)),
-            contacts=compile_interaction(interaction, world),
+        self.turning_radius = turning_radius
+        self.contacts = compile_interaction(interaction, world)
+        self._jam_length = self._endless_length()
+        self.room = Room(
+            footprint(world.robot),
+            obstacles(keep_out(world)),
+            goal_numbers(self.goal, INSET * self.size),
+            SPACING * self.size,
         )
         # crowded worlds are slow to sweep: look at the stop rule more often
         self._batch = max(1, 10 * BATCH // (10 + len(world.movables)))
@@ -143,9 +138,8 @@ class PathImprover:
             self._set_margin(margin)
         radius = self.world.robot.turning_radius
         if self.world.robot.drive is Drive.DIFFERENTIAL:
-            radius = 0.5 * self.problem.turning_radius
-        radius = max(radius, TIGHTEST * self.size)
-        self.problem = self.problem._replace(turning_radius=radius)
+            radius = 0.5 * self.turning_radius
+        self.turning_radius = max(radius, TIGHTEST * self.size)
 
     def _set_margin(self, margin: float) -> None:
         """Keep ``margin`` [m] from walls; with little of it poses lie closer, for what is thin."""
@@ -154,9 +148,9 @@ class PathImprover:
         if margin < _THIN_MARGIN * self.size:
             spacing = min(spacing, max(2.0 * margin, _LEAST_SPACING * self.size))
         shape = footprint(self.world.robot, margin)
-        self.problem = self.problem._replace(spacing=spacing, footprint=shape)
+        self.room = self.room._replace(spacing=spacing, footprint=shape)
 
-    def _jam_length(self) -> float:
+    def _endless_length(self) -> float:
         """A length [m] that no path without a jam comes near."""
         world = self.world
         extent = float((world.static.bounds[2:] - world.static.bounds[:2]).sum())
@@ -164,15 +158,25 @@ class PathImprover:
         return _BEYOND * (extent + self.size) * (1.0 + load)
 
     @property
-    def room(self) -> Room:
-        """Free space of the robot."""
-        problem = self.problem
-        return Room(problem.footprint, problem.walls, problem.goal, problem.spacing)
+    def problem(self) -> core.PathProblem:
+        """Costs and constraints of paths, with the limits of now."""
+        room = self.room
+        return core.PathProblem(
+            robot_mass=self.world.robot.mass,
+            push_weight=self.config.push_weight,
+            turning_radius=self.turning_radius,
+            spacing=room.spacing,
+            jam_length=self._jam_length,
+            displacement=1.5 * self.size,
+            goal=room.goal,
+            footprint=room.footprint,
+            walls=room.walls,
+        )
 
     @property
     def jam_cost(self) -> float:
         """A cost [kg m] that no path without a jam comes near."""
-        return self.problem.jam_length * self.problem.robot_mass
+        return self._jam_length * self.world.robot.mass
 
     @property
     def plan_cost(self) -> float:
@@ -186,8 +190,8 @@ class PathImprover:
 
     def stopped(self) -> bool:
         """Return True if the stop rule fires now."""
-        if isinstance(self.problem.contacts, SweptContacts):
-            self.problem.contacts.call.raise_error()
+        if isinstance(self.contacts, SweptModel):
+            self.contacts.raise_error()
         return self._call.check(self.iterations, self.plan_cost)
 
     def candidate(
@@ -198,12 +202,10 @@ class PathImprover:
         free: bool = True,  # True if it is known to touch no wall and to reach the goal
     ) -> Candidate | None:
         """The path along some arcs with its cost; None if it is not one that could be a plan."""
-        problem = self.problem
         path, used = self.laid_out(np.concatenate([self.lead.pieces, arcs]))
         if not free:
-            shape = problem.footprint
-            corners = np.empty_like(shape.vertices)
-            blocked = first_blocked(path.poses, used, shape, problem.walls, corners) < used
+            checker = core.CollisionChecker(self.room.footprint, self.room.walls)
+            blocked = checker.first_blocked(path.poses[:used]) < used
             x, y = path.poses[used - 1, :2]
             if blocked or self.goal.distance(float(x), float(y)) > 0.0:
                 return None
@@ -212,14 +214,14 @@ class PathImprover:
             return None
         self._keep(path, used, cost)
         trial = make_swept_path(len(path.poses), len(self.world.movables))
-        return Candidate(path, trial, used, cost)
+        return Candidate(path, trial.view(), used, cost)
 
     def laid_out(self, arcs: FloatArray) -> tuple[SweptPath, int]:
         """The poses along arcs (E, 2) from the robot to the goal, not swept, and their number."""
-        steps = [abs(arc) / step_along(turn, self.problem.spacing) for arc, turn in arcs.tolist()]
+        steps = [abs(arc) / core.step_along(turn, self.room.spacing) for arc, turn in arcs.tolist()]
         capacity = 3 * int(sum(steps) + len(arcs)) + 200
         path = make_swept_path(capacity, len(self.world.movables))
-        used = lay_out(owned(self.world.robot_pose), arcs, path, self.problem)
+        used = core.lay_out(self.world.robot_pose, arcs, path.view(), self.problem)
         assert used > 0  # there is room for three times as many poses
         path.objects[0] = self.world.movables.poses
         return path, used
@@ -231,15 +233,19 @@ class PathImprover:
         """
         cost = 0.0
         swept = 1
+        view = path.view()
+        problem = self.problem
         for first, last in self._sweep_pace.pieces(count - 1, self.stopped):
             swept = last + 1
-            cost = sweep_cost(path, first, swept, limit, ENDLESS, self.problem)
+            cost = core.sweep_cost(view, first, swept, limit, ENDLESS, problem, self.contacts)
             if not cost < limit:
                 return None
         return cost if swept == count else None
 
     def shortcut(self, candidate: Candidate) -> None:
         """Try `SHORTCUTS` shortcuts, as long as the stop rule allows."""
+        view = candidate.path.view()
+        problem = self.problem
         for _ in range(0, SHORTCUTS, self._batch):
             if self.stopped():
                 return
@@ -248,14 +254,15 @@ class PathImprover:
             # between pieces only the clock counts: what else may fire has been looked at
             late = partial(self._call.check, self.iterations, self.plan_cost)
             for first, last in self._shortcut_pace.pieces(self._batch, late):
-                candidate.count, candidate.cost = shortcut(
-                    candidate.path,
+                candidate.count, candidate.cost = core.shortcut(
+                    view,
                     candidate.count,
                     candidate.cost,
                     draws[first:last],
                     normals[first:last],
                     candidate.trial,
-                    self.problem,
+                    problem,
+                    self.contacts,
                 )
                 self._keep(candidate.path, candidate.count, candidate.cost)
             self.iterations += self._batch

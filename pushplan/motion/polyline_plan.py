@@ -7,8 +7,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from pushplan.core import motion as core
 from pushplan.geometry.angles import wrap_angle
-from pushplan.motion.collision import first_blocked, footprint, obstacles
+from pushplan.motion.collision import footprint, obstacles
 from pushplan.world import Plan, PlanResult, PlanStatus, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.planning_call import PlanningCall
@@ -76,10 +77,8 @@ def polyline_status(world: World, plan: Plan) -> PlanStatus:
         first
     ]
     dense = np.concatenate([poses[first] + fraction[:, None] * moves[first], poses[-1:]])
-    walls = obstacles(world.static)
-    shape = footprint(robot)
-    free = first_blocked(dense, len(dense), shape, walls, np.empty_like(shape.vertices))
-    if free < len(dense):
+    checker = core.CollisionChecker(footprint(robot), obstacles(world.static))
+    if checker.first_blocked(dense) < len(dense):
         return PlanStatus.PATH_ONLY
     return PlanStatus.SOLVED
 

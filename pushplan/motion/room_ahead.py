@@ -8,14 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pushplan.compiled import copy_into, kernel
-from pushplan.motion.collision import ConvexObstacles, Footprint, is_free
-from pushplan.motion.dubins import along_arc, step_along
-from pushplan.motion.goal_region import in_goal
-from pushplan.motion.recovery_path import can_turn
+from pushplan.core import motion as core
 from pushplan.motion.time_slicing import never
 from pushplan.world import Drive, RobotModel
-from pushplan.world.checks import BoolArray, FloatArray, IntArray
+from pushplan.world.checks import FloatArray
 
 _STEP = 0.08  # length of a step [circumscribed radii]
 _CELL = 0.6  # sides of the boxes of poses of which one is looked at each [steps]
@@ -27,15 +23,13 @@ _MOST_POSES_AHEAD = 5_000  # poses that are looked at, ahead; then it counts as 
 _MOST_POSES = 60_000  # the same where the robot may do all that it can
 _PIECE = 250  # poses between two looks at the stop rule: about a millisecond
 _FINER = 0.25  # steps of the second look, before a robot is said to be boxed in
-_CLOSED = -1
-_PAUSED = -2
 
 
 class Room(NamedTuple):
     """Free space of a robot."""
 
-    footprint: Footprint
-    walls: ConvexObstacles
+    footprint: core.Footprint
+    walls: core.ConvexObstacles
     goal: FloatArray  # (5,) from `goal_numbers`
     spacing: float  # greatest distance between two poses of a path [m]
 
@@ -47,79 +41,6 @@ class _Rules(NamedTuple):
     reach: float  # distance at which the robot has got away [m]
     clearance: float  # of places to turn about that are looked for, 0 for none [m]
     breadth: bool  # fewest moves first; else the last move from the last pose
-
-
-class _Explored(NamedTuple):
-    """Poses that were found, in memory that is made once."""
-
-    poses: FloatArray  # (N, 3)
-    before: IntArray  # (N,) the pose before each one
-    moves: IntArray  # (N,) the move that has led to it
-    open: IntArray  # (N,) poses to go on from
-    counters: IntArray  # (4,) first and last + 1 of the open ones, poses found, poses looked at
-    seen: BoolArray  # (rows, columns, headings) boxes with a pose
-
-
-@kernel(allocates=True)
-def _explore(
-    room: Room,
-    rules: _Rules,
-    sides: FloatArray,  # (2,) of the boxes of poses of which one is looked at each [m, rad]
-    found: _Explored,  # changed in place
-    upto: int,  # poses looked at in all
-) -> int:
-    """Go on until so many poses are looked at; the pose that is away, `_CLOSED` or `_PAUSED`.
-
-    Objects do not count, as they may be pushed.
-    """
-    poses = found.poses
-    counters = found.counters
-    start = found.poses[0]
-    half = found.seen.shape[0] // 2
-    turns = found.seen.shape[2]
-    corners = np.empty_like(room.footprint.vertices)
-    pose = np.empty(3)
-    while counters[0] < counters[1] and counters[3] < upto:
-        counters[3] += 1
-        if rules.breadth:
-            at = found.open[counters[0]]
-            counters[0] += 1
-        else:
-            counters[1] -= 1
-            at = found.open[counters[1]]
-        for m in range(rules.moves.shape[0]):
-            length = rules.moves[m, 0]
-            curvature = rules.moves[m, 1]
-            steps = 1
-            free = True
-            if rules.breadth:  # the way may be driven: these are the poses that its plan will have
-                steps = int(np.ceil(abs(length) / step_along(curvature, room.spacing)))
-            for step in range(1, steps + 1):
-                along_arc(poses[at], length * step / steps, curvature, pose)
-                free = free and is_free(pose, room.footprint, room.walls, corners)
-            if not free:
-                continue
-            dx = pose[0] - start[0]
-            dy = pose[1] - start[1]
-            j = half + int(np.rint(dx / sides[0]))
-            i = half + int(np.rint(dy / sides[0]))
-            t = int(np.floor(pose[2] % (2.0 * np.pi) / sides[1])) % turns
-            new = counters[2]
-            if new == poses.shape[0] or found.seen[i, j, t]:
-                continue
-            found.seen[i, j, t] = True
-            copy_into(poses[new], pose)
-            found.before[new] = at
-            found.moves[new] = m
-            counters[2] += 1
-            away = dx * dx + dy * dy > rules.reach * rules.reach
-            if rules.clearance > 0.0:
-                away = away or can_turn(pose, rules.clearance, room.walls)
-            if away or in_goal(pose[0], pose[1], room.goal):
-                return int(new)
-            found.open[counters[1]] = new
-            counters[1] += 1
-    return _PAUSED if counters[0] < counters[1] else _CLOSED
 
 
 def gets_away(room: Room, start: FloatArray, size: float, radius: float) -> bool:
@@ -135,7 +56,7 @@ def gets_away(room: Room, start: FloatArray, size: float, radius: float) -> bool
         radius: its least turning radius [m].
     """
     rules = _Rules(_arcs(_STEP * size, radius), _REACH * size, 0.0, False)
-    return _search(room, rules, start, _MOST_POSES_AHEAD, never)[0] != _CLOSED
+    return _search(room, rules, start, _MOST_POSES_AHEAD, never)[0] != core.RoomOutcome.CLOSED
 
 
 def is_boxed_in(
@@ -154,7 +75,7 @@ def is_boxed_in(
     for step in (_STEP, _FINER * _STEP):
         moves = _moves(robot, step, radius)
         rules = _Rules(moves, _REACH * size, 0.0, False)
-        if _search(room, rules, start, _MOST_POSES, stopped)[0] != _CLOSED:
+        if _search(room, rules, start, _MOST_POSES, stopped)[0] != core.RoomOutcome.CLOSED:
             return False
     return True
 
@@ -175,19 +96,15 @@ def way_to_turn(
     """
     size = robot.circumscribed_radius
     swept = room.footprint.radius
-    if can_turn(start, swept, room.walls):
+    if room.walls.can_turn(start[0], start[1], swept):
         return None
     moves = _moves(robot, _STEP, size)
     for clearance, most in ((_SPACIOUS * swept, _MOST_POSES_AHEAD), (swept, _MOST_POSES)):
         rules = _Rules(moves, _FAR * size, clearance, True)
-        at, found = _search(room, rules, start, most, stopped)
-        if at > 0:
-            break
-    arcs = []
-    while at > 0:
-        arcs.append(moves[found.moves[at]])
-        at = int(found.before[at])
-    return np.array(arcs[::-1]) if arcs else None
+        outcome, search = _search(room, rules, start, most, stopped)
+        if outcome == core.RoomOutcome.AWAY:
+            return search.arcs
+    return None
 
 
 def _arcs(step: float, radius: float) -> FloatArray:
@@ -211,7 +128,7 @@ def _search(
     start: FloatArray,
     most: int,  # poses to look at
     stopped: Callable[[], bool],
-) -> tuple[int, _Explored]:
+) -> tuple[core.RoomOutcome, core.RoomExploration]:
     """Explore from ``start`` until the outcome is known, or as long as is allowed."""
     moves = np.abs(rules.moves).tolist()
     cell = _CELL * moves[-1][0]
@@ -224,19 +141,12 @@ def _search(
     half = int(rules.reach / cell) + 2
     headings = math.ceil(math.tau / turn)
     capacity = len(rules.moves) * most + 1
-    found = _Explored(
-        poses=np.empty((capacity, 3)),
-        before=np.zeros(capacity, dtype=np.int64),
-        moves=np.zeros(capacity, dtype=np.int64),
-        open=np.zeros(capacity, dtype=np.int64),
-        counters=np.array([0, 1, 1, 0]),
-        seen=np.zeros((2 * half + 1, 2 * half + 1, headings), dtype=np.bool_),
+    search = core.RoomExploration(
+        *room, *rules, start, side=cell, turn=turn, half=half, headings=headings, capacity=capacity
     )
-    found.poses[0] = start
-    outcome = _PAUSED
-    sides = np.array([cell, turn])
+    outcome = core.RoomOutcome.PAUSED
     for upto in range(_PIECE, most + _PIECE, _PIECE):
-        if outcome != _PAUSED or stopped():
+        if outcome != core.RoomOutcome.PAUSED or stopped():
             break
-        outcome = int(_explore(room, rules, sides, found, min(upto, most)))
-    return outcome, found
+        outcome = search.run(min(upto, most))
+    return outcome, search

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from pushplan.compiled import owned
-from pushplan.motion.collision import footprint, is_free, obstacles
+from pushplan.core import motion as core
+from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.keep_out import keep_out
-from pushplan.motion.path_problem import SweptPath
+from pushplan.motion.swept_path import SweptPath
 from pushplan.world import Drive, GoalDisc, InvalidInputError, Plan, RobotModel, World
 from pushplan.world.checks import BoolArray, FloatArray
 from pushplan.world.polyline import goes_back
@@ -57,7 +57,7 @@ def start_margin(world: World, margin: float) -> float | None:
     walls = obstacles(keep_out(world))
     for fraction in _FRACTIONS:
         shape = footprint(world.robot, fraction * margin)
-        if is_free(owned(world.robot_pose), shape, walls, np.empty_like(shape.vertices)):
+        if core.CollisionChecker(shape, walls).is_free(world.robot_pose):
             return fraction * margin
     return None
 

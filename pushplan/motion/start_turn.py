@@ -6,15 +6,11 @@ import math
 
 import numpy as np
 
-from pushplan.compiled import copy_into, kernel, owned
+from pushplan.core import motion as core
 from pushplan.geometry import VisibilityGraph
-from pushplan.interaction.advance import advance_objects
-from pushplan.motion.arc_rollout import sweep_cost
-from pushplan.motion.collision import footprint, is_free, obstacles
-from pushplan.motion.dubins import MAX_TURN
+from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_improver import ENDLESS, Lead, PathImprover
-from pushplan.motion.path_problem import PathProblem
 from pushplan.motion.room_ahead import way_to_turn
 from pushplan.world import Drive
 from pushplan.world.checks import FloatArray
@@ -45,7 +41,7 @@ def start_turn(improver: PathImprover, before: Lead | None = None) -> Lead | Non
     if world.robot.drive is not Drive.DIFFERENTIAL:
         return None
     if before is None:
-        before = Lead(np.empty((0, 2)), owned(world.robot_pose), owned(world.movables.poses))
+        before = Lead(np.empty((0, 2)), world.robot_pose, world.movables.poses)
     start = before.pose
     heading = _first_heading(improver, start[:2])
     if heading is None:
@@ -53,9 +49,9 @@ def start_turn(improver: PathImprover, before: Lead | None = None) -> Lead | Non
     left = math.remainder(heading - float(start[2]), math.tau)
     if abs(left) < _LEAST:
         return None
-    angle, error, objects = _turn_freely(improver.problem, start, before.objects, left)
+    angle, error, objects = _turn_freely(improver, before, left)
     longer = left - math.copysign(math.tau, left)
-    other = _turn_freely(improver.problem, start, before.objects, longer)
+    other = _turn_freely(improver, before, longer)
     if other[1] < error - _LEAST:
         angle, error, objects = other
     if error > abs(left) - _LEAST:
@@ -77,18 +73,20 @@ def drive_to_turn(improver: PathImprover) -> Lead | None:
         The drive; None where there is none, or the robot can turn about where it is.
     """
     world = improver.world
-    problem = improver.problem
-    start = owned(world.robot_pose)
+    room = improver.room
+    start = world.robot_pose
     boxes = unflatten(world.movables.vertices_world, world.movables.offsets)
     among = obstacles(keep_out(world), boxes)
-    for walls in (among, problem.walls) if boxes else (problem.walls,):
-        for shape in (problem.footprint, footprint(world.robot)):
-            room = improver.room._replace(footprint=shape, walls=walls)
-            arcs = way_to_turn(world.robot, room, start, improver.stopped)
+    for walls in (among, room.walls) if boxes else (room.walls,):
+        for shape in (room.footprint, footprint(world.robot)):
+            space = room._replace(footprint=shape, walls=walls)
+            arcs = way_to_turn(world.robot, space, start, improver.stopped)
             if arcs is not None:
                 path, count = improver.laid_out(arcs)
-                sweep_cost(path, 0, count, np.inf, ENDLESS, problem)
-                driven = Lead(arcs, owned(path.poses[count - 1]), owned(path.objects[count - 1]))
+                core.sweep_cost(
+                    path.view(), 0, count, np.inf, ENDLESS, improver.problem, improver.contacts
+                )
+                driven = Lead(arcs, path.poses[count - 1], path.objects[count - 1])
                 return start_turn(improver, driven) or driven
     return None
 
@@ -109,11 +107,9 @@ def _first_heading(improver: PathImprover, start: FloatArray) -> float | None:
     return None
 
 
-@kernel(allocates=True)
 def _turn_freely(
-    problem: PathProblem,
-    start: FloatArray,  # (3,) pose
-    objects: FloatArray,  # (K, 3) poses of the objects there
+    improver: PathImprover,
+    before: Lead,  # where the turn begins
     angle: float,  # to turn by [rad]
 ) -> tuple[float, float, FloatArray]:
     """Turn until something blocks it; what of the turn comes nearest to the wanted heading.
@@ -121,26 +117,8 @@ def _turn_freely(
     Returns:
         The angle [rad], the heading error that is left [rad], and (K, 3) poses of the objects.
     """
-    steps = int(np.ceil(abs(angle) / MAX_TURN))
-    here = start.copy()
-    last = start.copy()
-    poses = objects.copy()
-    moved = np.zeros(objects.shape[0])
-    best_poses = poses.copy()
-    corners = np.empty_like(problem.footprint.vertices)
-    best = np.abs((angle + np.pi) % (2.0 * np.pi) - np.pi)
-    turned = 0.0
-    for step in range(1, steps + 1):
-        here[2] = start[2] + angle * step / steps
-        if not is_free(here, problem.footprint, problem.walls, corners):
-            break
-        if not advance_objects(problem.contacts, last, here, poses, moved):
-            break
-        copy_into(last, here)
-        left = angle - angle * step / steps
-        error = np.abs((left + np.pi) % (2.0 * np.pi) - np.pi)
-        if error < best:
-            best = error
-            turned = angle * step / steps
-            copy_into(best_poses, poses)
-    return turned, best, best_poses
+    objects = np.empty_like(before.objects)
+    turned, error = core.turn_freely(
+        improver.problem, improver.contacts, before.pose, before.objects, angle, objects
+    )
+    return turned, error, objects

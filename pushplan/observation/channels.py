@@ -5,14 +5,13 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
-from pushplan.compiled import kernel
+from pushplan.core import observation as core
 from pushplan.geometry import geodesic_field
-from pushplan.geometry.shadows import BendDistances, Table, bend_distances, fill_shadows
-from pushplan.observation.view import Image, View, fill_bodies, fill_parts, sample, to_pixels
+from pushplan.geometry.shadows import BendDistances, bend_distances
+from pushplan.observation.view import Image, View
 from pushplan.world import Goal, StaticMap
 from pushplan.world.checks import FloatArray, IntArray, frozen
 from pushplan.world.outline import flatten, transform
@@ -50,61 +49,20 @@ def fill_hidden(image: Image, view: View, source: BendDistances, per_metre: floa
         source: distances of the static map.
         per_metre: value of a pixel that is 1 m away; what passes 255, or is cut off, becomes 255.
     """
-    pose = view.world.robot_pose
-    bends, lengths = source.in_sight(float(pose[0]), float(pose[1]))
-    origin = source.grid.origin
-    step = source.grid.resolution
-    sight = _Sight(source.loops, source.offsets, source.table, origin, step, bends, lengths)
-    _fill_hidden(image, view.numbers, pose[None, :2], sight, per_metre)
-
-
-class _Sight(NamedTuple):
-    """Data for finding the corners of shortest paths that the robot sees."""
-
-    loops: FloatArray  # (V, 2) outlines that cast shadows [m]
-    offsets: IntArray  # start of each
-    table: Table  # (rows, columns, corners) distances from the corners [m]
-    origin: FloatArray  # (2,) of the table [m]
-    step: float  # side of its cells [m]
-    bends: IntArray  # corners in sight
-    lengths: FloatArray  # paths to them [m]
-
-
-@kernel(allocates=True)
-def _fill_hidden(
-    image: Image,
-    view: FloatArray,
-    eye: FloatArray,  # (1, 2) the robot [m]
-    sight: _Sight,
-    per_metre: float,
-) -> None:
-    """Overwrite the pixels in the shadow of the loops by the length of the path to them."""
-    loops, offsets, table, origin, step, bends, lengths = sight  # quicker than in the loops
-    spots = np.empty_like(loops)
-    at = np.empty((1, 2))
-    to_pixels(view, loops, spots)
-    to_pixels(view, eye, at)
-    hidden = np.zeros(image.shape, dtype=np.uint8)
-    fill_shadows(hidden, at[0, 0], at[0, 1], spots, offsets, 1)
-    c = math.cos(view[2])
-    s = math.sin(view[2])
-    rows = table.shape[0]
-    cols = table.shape[1]
-    for r in range(image.shape[0]):
-        up = (0.5 * view[3] - r - 0.5) * view[5]
-        for q in range(image.shape[1]):
-            if not hidden[r, q]:
-                continue
-            left = (0.5 * view[4] - q - 0.5) * view[6]
-            u = (view[0] + c * up - s * left - origin[0]) / step
-            v = (view[1] + s * up + c * left - origin[1]) / step
-            best = math.inf
-            if 0.0 <= u < cols and 0.0 <= v < rows:  # ways stay inside the bounds
-                i = int(v)
-                j = int(u)
-                for k in range(bends.shape[0]):
-                    best = min(best, lengths[k] + table[i, j, bends[k]])
-            image[r, q] = int(min(255.0, per_metre * best + 0.5))
+    x, y, _ = view.world.robot_pose.tolist()
+    core.fill_hidden(
+        image,
+        view.numbers,
+        x,
+        y,
+        source.loops,
+        source.offsets,
+        source.table,
+        source.grid.origin,
+        source.grid.resolution,
+        *source.in_sight(x, y),
+        per_metre,
+    )
 
 
 MOVABLE = 128
@@ -115,7 +73,7 @@ def footprint(image: Image, view: View) -> None:
     """Draw the robot, 255."""
     robot = view.world.robot
     vertices = frozen(transform(view.world.robot_pose, robot.vertices))
-    fill_parts(image, view.numbers, vertices, robot.offsets, 255)
+    core.fill_parts(image, view.numbers, vertices, robot.offsets, 255)
 
 
 def movable(image: Image, view: View) -> None:
@@ -140,7 +98,7 @@ def goal_distance(image: Image, view: View) -> None:
     0 at the goal, 255 at the farthest place from which there is a way, and where there is none.
     """
     values, origin, step = _distance_raster(view.world.static, view.world.goal, view.finest)
-    sample(image, view.numbers, values, origin[0], origin[1], step)
+    core.sample(image, view.numbers, values, origin[0], origin[1], step)
 
 
 def robot_distance(image: Image, view: View) -> None:
@@ -165,7 +123,7 @@ def heading_line(image: Image, view: View) -> None:
     x, y, heading = view.world.robot_pose.tolist()
     ahead = [x + view.finest * math.cos(heading), y + view.finest * math.sin(heading)]
     points = np.array([[x, y], ahead])
-    to_pixels(view.numbers, points, points)
+    core.to_pixels(view.numbers, points, points)
     (col, row), (next_col, next_row) = points.tolist()
     draw_ray(image, col, row, next_col - col, next_row - row, 255)
 
@@ -185,11 +143,11 @@ CHANNELS: dict[str, Callable[[Image, View], None]] = {
 def _fill_movables(image: Image, view: View, value: int) -> None:
     objects = view.world.movables
     shapes = objects.poses, objects.vertices, objects.offsets, objects.radii
-    fill_bodies(image, view.numbers, *shapes, value)
+    core.fill_bodies(image, view.numbers, *shapes, value)
 
 
 def _fill_static(image: Image, view: View) -> None:
-    fill_parts(image, view.numbers, *_static_parts(view.world.static), 255)
+    core.fill_parts(image, view.numbers, *_static_parts(view.world.static), 255)
 
 
 @functools.lru_cache(maxsize=16)

@@ -10,14 +10,8 @@ import numpy as np
 from pushplan.control import waiting_twist
 from pushplan.control.limits import ramp_twist
 from pushplan.control.stopping import add_arc, stopping_path
-from pushplan.motion.collision import (
-    ConvexObstacles,
-    Footprint,
-    first_blocked,
-    footprint,
-    obstacles,
-    static_depth,
-)
+from pushplan.core import motion as core
+from pushplan.motion.collision import footprint, obstacles
 from pushplan.runtime.noise_allowance import NoiseAllowance
 from pushplan.world import StaticMap, Twist, World
 from pushplan.world.checks import FloatArray
@@ -172,31 +166,23 @@ class _Closeness:
         outlines: what is near.
     """
 
-    def __init__(self, shape: Footprint, pose: FloatArray, outlines: list[FloatArray]) -> None:
-        self._shape = shape
-        self._scratch = np.empty_like(shape.vertices)
-        self._too_near: list[tuple[ConvexObstacles, float]] = []
+    def __init__(self, shape: core.Footprint, pose: FloatArray, outlines: list[FloatArray]) -> None:
+        self._too_near: list[tuple[core.CollisionChecker, float]] = []
         clear = []
         for outline in outlines:
-            one = obstacles(_ANYWHERE, (outline,))
-            depth = self._depth(pose, one)
+            one = core.CollisionChecker(shape, obstacles(_ANYWHERE, (outline,)))
+            depth = one.depth(pose)
             if depth > 0.0:
                 self._too_near.append((one, depth + _DEEPER * shape.radius))
             else:
                 clear.append(outline)
-        self._clear = obstacles(_ANYWHERE, tuple(clear))
+        self._clear = core.CollisionChecker(shape, obstacles(_ANYWHERE, tuple(clear)))
 
     def allows(self, path: FloatArray) -> bool:
         """Tell whether a path (N, 3) may be driven."""
-        count = len(path)
-        if first_blocked(path, count, self._shape, self._clear, self._scratch) < count:
+        if self._clear.first_blocked(path) < len(path):
             return False
-        return all(
-            self._depth(pose, one) <= depth for one, depth in self._too_near for pose in path
-        )
-
-    def _depth(self, pose: FloatArray, one: ConvexObstacles) -> float:
-        return float(static_depth(pose, self._shape, one, self._scratch))
+        return all(one.depth(pose) <= depth for one, depth in self._too_near for pose in path)
 
 
 def _fixed(world: World) -> dict[int, FloatArray]:

@@ -8,15 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
+from pushplan.core import scenarios as core
 from pushplan.geometry import polygon_area
-from pushplan.scenarios.floe_kernels import (
-    Discs,
-    IceWater,
-    Outlines,
-    cut_cells,
-    fit_floes,
-    place_discs,
-)
 from pushplan.scenarios.floe_sizes import MARGIN, FloeSizes
 from pushplan.scenarios.ice_field import IceField
 from pushplan.world import InvalidInputError, ScenarioError
@@ -77,19 +70,23 @@ def generate_ice(
     gap = 0.03 * sizes.mean_radius if gap is None else gap
     gap = number("ice gap", gap, low=0.0, high=sizes.least, open_low=True)
     blocks = flatten(convex_outlines("keep_off", keep_off))
-    water = IceWater(box, *blocks, gap)
+    water = core.IceWater(box, *blocks, gap)
     wanted = concentration * float(np.prod(box[2:] - box[:2]))
     if wanted == 0.0:
         return IceField((), box)
     _check_possible(wanted, concentration, sizes, box)
-    return _pack(rng, wanted, sizes, water, clumping)
+    return _pack(rng, wanted, sizes, box, water, clumping)
 
 
 def _pack(
-    rng: np.random.Generator, wanted: float, sizes: FloeSizes, water: IceWater, clumping: float
+    rng: np.random.Generator,
+    wanted: float,
+    sizes: FloeSizes,
+    box: FloatArray,
+    water: core.IceWater,
+    clumping: float,
 ) -> IceField:
     """Floes of a total area [m²]: with large discs first, then with smaller ones."""
-    box = water.box
     concentration = wanted / float(np.prod(box[2:] - box[:2]))
     areas = sizes.draw(rng, wanted)
     if abs(areas.sum() - wanted) > 0.01 * wanted:
@@ -99,14 +96,14 @@ def _pack(
         )
     density = _density(rng, box, sizes.mean_radius, clumping)
     best = 0.0
-    for core in _CORES:
+    for fraction in _CORES:
         draws = rng.random((len(areas), _DRAWS, 3))
-        radii = core * np.sqrt(areas / np.pi)
-        centres = place_discs(radii, draws, density, water)
+        radii = fraction * np.sqrt(areas / np.pi)
+        centres = core.place_discs(radii, draws, density, water)
         if len(centres) < len(areas):
             continue
         shapes = _random_shapes(rng, len(areas))
-        floes = _grow(areas, wanted, sizes, shapes, centres, radii, water)
+        floes = _grow(areas, wanted, sizes, *shapes, centres, radii, water)
         reached = sum(polygon_area(floe) for floe in floes)
         if reached >= wanted:
             return IceField(_shrunk(floes, wanted / reached), box)
@@ -160,8 +157,8 @@ def _density(
     return np.ascontiguousarray(1.0 - clumping + clumping * level**3)
 
 
-def _random_shapes(rng: np.random.Generator, count: int) -> Outlines:
-    """Convex outlines of area 1 about their centroids.
+def _random_shapes(rng: np.random.Generator, count: int) -> tuple[FloatArray, IntArray]:
+    """Convex outlines (K, N, 2) of area 1 about their centroids, and how many corners each has.
 
     Corners lie on an ellipse at uneven angles, so that they are always in convex position.
     """
@@ -184,28 +181,28 @@ def _random_shapes(rng: np.random.Generator, count: int) -> Outlines:
     area = 0.5 * cross.sum(axis=1)
     middle = ((points + after) * cross[..., None]).sum(axis=1) / (6.0 * area[:, None])
     points = (points - middle[:, None]) / np.sqrt(area)[:, None, None]
-    return Outlines(np.ascontiguousarray(points), numbers.astype(np.int64))
+    return np.ascontiguousarray(points), numbers.astype(np.int64)
 
 
 def _grow(
     areas: FloatArray,
     wanted: float,
     sizes: FloeSizes,
-    shapes: Outlines,
+    shapes: FloatArray,  # from `_random_shapes`, as the next one
+    corner_counts: IntArray,
     centres: FloatArray,
     radii: FloatArray,
-    water: IceWater,
+    water: core.IceWater,
 ) -> list[FloatArray]:
     """Floes in their cells, together of at least the wanted area if there is space for it."""
-    furthest = np.hypot(shapes.corners[..., 0], shapes.corners[..., 1]).max(axis=1)
+    furthest = np.hypot(shapes[..., 0], shapes[..., 1]).max(axis=1)
     reaches = 1.15 * _STRETCH * furthest * np.sqrt(areas)
-    discs = Discs(centres, radii, reaches, *_neighbours(centres, reaches))
-    cells = cut_cells(discs, water)
+    cells = core.cut_cells(centres, radii, reaches, *_neighbours(centres, reaches), water)
     targets = (1.0 + MARGIN) * areas
     least = np.pi * sizes.least**2 * (1.0 + MARGIN)
     greatest = np.pi * sizes.greatest**2
     for _ in range(_ROUNDS):
-        corners, counts = fit_floes(shapes, centres, cells, targets, _STRETCH)
+        corners, counts = core.fit_floes(shapes, corner_counts, centres, *cells, targets, _STRETCH)
         grown = [corners[k, :n] for k, n in enumerate(counts.tolist()) if n]
         found = [polygon_area(floe) for floe in grown]
         floes = [floe for floe, area in zip(grown, found, strict=True) if area >= least]

@@ -1,7 +1,7 @@
 """Dijkstra's algorithm over the cells of a grid with eight neighbours each, compiled.
 
 It serves the coarse path of the navigation planners and the floor of the push-aware planner's
-cost-to-go. Three searches stay apart. `geometry.visibility.relax` runs over a graph of bends, not
+cost-to-go. Three searches stay apart. `relax` of the core runs over a graph of bends, not
 over a grid. The distance fields of `geometry.distance_field` are exact: no cell depends on
 another. The search over poses of `planners.rearrangement.pose_search` has headings, costs that
 depend on both ends of a move, and so many poses that buckets take the place of the heap.
@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pushplan.compiled import kernel
+from pushplan.core import search as core
 from pushplan.search.heap import pop_least, push_or_lift
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
@@ -91,8 +92,8 @@ def grid_dijkstra(
     stopped: Callable[[], bool] = lambda: False,  # ends the search, asked every few milliseconds
 ) -> tuple[FloatArray, IntArray, IntArray]:
     """Costs (rows, columns), parents, and settled cells in order, the first goal last; -1: none."""
-    search = new_grid_search(weights.shape[0], weights.shape[1], starts)
+    search = core.GridDijkstra(weights, cell, starts)
     upto = _PIECE
-    while settle_cells(search, weights, goals, cell, upto) and not stopped():
+    while search.settle(goals, upto) and not stopped():
         upto += _PIECE
-    return search.costs, search.parents, search.order[: search.counters[1]]
+    return search.costs, search.parents, search.order

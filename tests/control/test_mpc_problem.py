@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import casadi
 import numpy as np
@@ -12,29 +13,25 @@ from scipy.optimize import minimize
 from test_tracking_controllers import FLOOR, arc_plan
 
 from pushplan.control import MpcConfig, MpcTracker
-from pushplan.control.mpc.assembly_kernels import assemble, assembly_memory
 from pushplan.control.mpc.quadratic_program import ProgramSolver, quadratic_program
-from pushplan.control.mpc.tracking_kernels import (
-    ReferencePath,
-    Tuning,
-    errors,
-    locate,
-)
+from pushplan.core import control as core
 
 CURVATURE = 0.4
 CENTRE = np.array([0.0, 1.0 / CURVATURE])
 SIZE, SPEED, TURN = 0.8, 0.3, 0.5
 
 
-def circle_track() -> ReferencePath:
+LENGTHS = np.arange(0.0, 12.0, 0.1)
+
+
+def circle_track() -> core.ReferencePath:
     """A left turn of radius 1 / CURVATURE from the origin."""
-    lengths = np.arange(0.0, 12.0, 0.1)
-    angle = lengths * CURVATURE
+    angle = LENGTHS * CURVATURE
     poses = np.column_stack([np.sin(angle) / CURVATURE, (1.0 - np.cos(angle)) / CURVATURE, angle])
-    return ReferencePath(poses, lengths, np.full(len(lengths), SPEED))
+    return core.ReferencePath(poses, LENGTHS, np.full(len(LENGTHS), SPEED))
 
 
-def tuning(**changes: object) -> Tuning:
+def tuning(**changes: object) -> SimpleNamespace:
     fields: dict[str, object] = {
         "size": SIZE,
         "max_speed": SPEED,
@@ -48,7 +45,7 @@ def tuning(**changes: object) -> Tuning:
         "terminal": 4.0,
         "speed_weight": 0.2,
     }
-    return Tuning(**{**fields, **changes})
+    return SimpleNamespace(**{**fields, **changes})
 
 
 def reference(count, tune):
@@ -110,7 +107,8 @@ def test_the_assembled_problem_is_the_linearised_one(seed, optimise):
     last = rng.uniform(-0.2, 0.2)
     twist = np.array([SPEED, last])
     place = (pose, 0.3, twist, steps, nominal.copy())
-    assemble(circle_track(), tune, *place, hessian, gradient, assembly_memory(n))
+    weights = core.Tuning(**vars(tune))
+    core.TrackingAssembly(n).assemble(circle_track(), weights, *place, hessian, gradient)
     residuals, jacobian = reference(count, tune)(z, pose, last, steps)
     expected = jacobian.T @ jacobian
     slope = (jacobian.T @ residuals).ravel()
@@ -222,8 +220,8 @@ def test_places_and_errors_on_a_circle(along, offset):
     track = circle_track()
     angle = CURVATURE * along
     x, y = CENTRE + (1.0 / CURVATURE - offset) * np.array([math.sin(angle), -math.cos(angle)])
-    place, index, share = locate(track, x, y, max(along - 1.0, 0.0), along + 1.0)
-    found = errors(track, x, y, angle + 0.2, index, share)
+    place, index, share = track.locate(x, y, max(along - 1.0, 0.0), along + 1.0)
+    found = track.errors(x, y, angle + 0.2, index, share)
     assert place == pytest.approx(along, abs=0.02)  # the foot is on a chord, not on the arc
     assert found[0] == pytest.approx(offset, abs=2e-3)
     assert found[1:] == pytest.approx((0.2, angle, CURVATURE), abs=0.01)
@@ -231,8 +229,9 @@ def test_places_and_errors_on_a_circle(along, offset):
 
 def test_past_the_end_the_path_goes_on_straight():
     track = circle_track()
-    x, y, theta = track.poses[-1]
+    theta = CURVATURE * LENGTHS[-1]
+    x, y = CENTRE + np.array([math.sin(theta), -math.cos(theta)]) / CURVATURE
     over = [x + 2.0 * math.cos(theta), y + 2.0 * math.sin(theta)]
-    place, index, share = locate(track, *over, 11.0, 20.0)
-    assert place == pytest.approx(track.lengths[-1] + 2.0)
-    assert errors(track, *over, theta, index, share)[:3] == pytest.approx((0.0, 0.0, theta))
+    place, index, share = track.locate(*over, 11.0, 20.0)
+    assert place == pytest.approx(LENGTHS[-1] + 2.0)
+    assert track.errors(*over, theta, index, share)[:3] == pytest.approx((0.0, 0.0, theta))

@@ -162,7 +162,7 @@ def test_a_failure_on_the_way_is_bridged_by_the_last_solution():
             self.calls += 1
             if self.calls in (30, 36):
                 iterations = 1 if self.calls == 30 else self.config.solver_iterations
-                self._solver = ProgramSolver(self._memory.horizon.program, 1e-6, iterations)
+                self._solver = ProgramSolver(self._horizon.program, 1e-6, iterations)
             return super().command(world, plan)
 
     tracker = Failing()

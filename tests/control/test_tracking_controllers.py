@@ -18,7 +18,7 @@ from pushplan.control import (
     TwistLimiter,
     clamp_twist,
 )
-from pushplan.motion.dubins import along_arc
+from pushplan.core import motion as core
 from pushplan.world import Controller, InvalidInputError, Plan, RobotModel, StaticMap, Twist, World
 
 FLOOR = StaticMap.build(bounds=[-50, -50, 50, 50])
@@ -31,7 +31,7 @@ def arc_plan(world: World, arcs: list[tuple[float, float]], spacing: float = 0.1
         steps = round(length / spacing)
         for _ in range(steps):
             here = np.empty(3)
-            along_arc(poses[-1], length / steps, curvature, here)
+            core.along_arc(poses[-1], length / steps, curvature, here)
             poses.append(here)
             bends.append(curvature)
     speed = world.robot.max_speed

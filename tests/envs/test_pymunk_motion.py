@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from pushplan.core import envs as core
 from pushplan.envs.simulators.base import Materials
-from pushplan.envs.simulators.momentum import slow_down
 from pushplan.envs.simulators.pymunk_drive import PymunkOptions
 from pushplan.envs.simulators.pymunk_simulator import PymunkSimulator
 from pushplan.envs.simulators.water import Water
@@ -73,7 +73,7 @@ def test_drag_solves_its_equation(speed, b, c, h):
         v -= h / 2000 * (b + c * v) * v
         w -= h / 2000 * (c + b * w) * w
     direction = np.array([0.6, -0.8])
-    kept = slow_down(
+    kept = core.slow_down(
         np.array([[*(speed * direction), -speed]]), np.ones(1), np.array([[b, c, c, b]]), h
     )
     np.testing.assert_allclose(kept[0, :2], v * direction, atol=2e-3 * speed + 1e-12)

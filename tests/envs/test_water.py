@@ -8,9 +8,10 @@ import pytest
 
 from benchmarks.accuracy import water_coasting
 from benchmarks.accuracy.water_coasting import coasting
+from pushplan.core import envs as core
 from pushplan.envs.simulators.base import Materials
 from pushplan.envs.simulators.pymunk_simulator import PymunkSimulator
-from pushplan.envs.simulators.water import Water, flow_shapes
+from pushplan.envs.simulators.water import Water
 from pushplan.envs.tasks.ship_ice import PRESETS, ShipIceTask
 from pushplan.world import Movables, Twist, World, stream
 
@@ -53,7 +54,7 @@ def test_what_the_flow_meets():
     disc = 10.0 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     plate = np.array([[-3.0, -1e-6], [3.0, -1e-6], [3.0, 1e-6], [-3.0, 1e-6]])
     square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-    shapes = flow_shapes(np.concatenate([disc, plate, square]), np.array([0, 200, 204, 208]))
+    shapes = core.flow_shapes(np.concatenate([disc, plate, square]), np.array([0, 200, 204, 208]))
     np.testing.assert_allclose(shapes[0, [0, 1]], (20.0, np.pi * 100.0), rtol=1e-3)
     assert shapes[0, 2] < 0.1  # a disc turns without pushing water aside
     assert shapes[0, 3] == pytest.approx(2.0 * np.pi * 1e5 / 5.0, rel=1e-3)

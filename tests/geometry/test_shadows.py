@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_shortest_path import random_map
 
+from pushplan.core import geometry as core
 from pushplan.geometry import VisibilityGraph, shadows
-from pushplan.geometry.shadows import bend_distances, fill_shadow
+from pushplan.geometry.shadows import bend_distances
 from pushplan.world import StaticMap
 
 SHAPE = (40, 50)
@@ -46,7 +47,7 @@ def test_a_shadow_is_what_cannot_be_seen(seed: int, where: str) -> None:
         share = rng.uniform(0.05, 0.95)
         eye = corners[0] + share * (corners[1] - corners[0])
     mask = np.zeros(SHAPE, np.uint8)
-    fill_shadow(mask, eye[0], eye[1], corners, 1)
+    core.fill_shadows(mask, eye[0], eye[1], corners, np.array([0, len(corners)]), 1)
     inside = shapely.Polygon(corners).buffer(-1e-9).contains(shapely.Point(eye))
     if inside and where == "free":
         assert not mask.any()

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from ice_scenes import channel, straight_path
 
-from pushplan.compiled import owned
+from pushplan.core import interaction as core
 from pushplan.interaction.ice_interaction import IceInteraction
 from pushplan.interaction.network import IceNetwork
 from pushplan.interaction.occupancy import (
@@ -20,7 +20,6 @@ from pushplan.interaction.occupancy import (
     make_batch,
     patch_after,
 )
-from pushplan.interaction.occupancy_kernels import cover_objects, cover_sweep
 from pushplan.interaction.occupancy_models import InteractionOccupancy
 from pushplan.world import GoalLine, InvalidInputError, Movables, StaticMap, World
 from pushplan.world.outline import transform
@@ -50,8 +49,8 @@ class TestCoverage:
         poses = np.column_stack([rng.uniform(1, 7, (3, 2)), rng.uniform(0, 6, 3)])
         floes = Movables.from_outlines([0.9 * SQUARE] * 3, poses)
         out = np.empty((40, 40), np.float32)
-        shapes = (owned(floes.vertices), owned(floes.offsets))
-        cover_objects(owned(floes.poses), *shapes, np.zeros(3), 0.2, out)
+        shapes = (floes.vertices, floes.offsets)
+        core.cover_objects(floes.poses, *shapes, np.zeros(3), 0.2, out)
         union = shapely.union_all([shapely.Polygon(floes.outline_world(k)) for k in range(3)])
         assert 0.04 * out.sum() == pytest.approx(union.area, rel=0.04)
         for row, column in rng.integers(0, 40, (20, 2)):
@@ -66,7 +65,7 @@ class TestCoverage:
         )
         out = np.empty((40, 40), np.float32)
         hull = world.robot
-        cover_sweep(path, owned(hull.vertices), owned(hull.offsets), np.zeros(3), 0.2, out)
+        core.cover_sweep(path, hull.vertices, hull.offsets, np.zeros(3), 0.2, out)
         fine = np.linspace(0, len(path) - 1, 300)
         poses = np.column_stack([np.interp(fine, range(len(path)), path[:, i]) for i in range(3)])
         union = shapely.union_all([shapely.Polygon(transform(p, hull.parts[0])) for p in poses])

@@ -7,9 +7,9 @@ from conftest import make_u_maze
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from pushplan.core import learned as core
 from pushplan.envs import PushEnv
 from pushplan.learned import FeatureObservation
-from pushplan.learned.features import cast_rays
 from pushplan.world import InvalidInputError
 from pushplan.world.outline import flatten
 
@@ -24,7 +24,7 @@ def test_rays_are_as_long_as_shapely_says(seed, count):
     x, y, heading = rng.uniform(-4, 4), rng.uniform(-4, 4), rng.uniform(-np.pi, np.pi)
     vertices, offsets = flatten(shapes)
     lengths = np.full(count, 6.0)
-    cast_rays(lengths, x, y, heading, vertices, offsets)
+    core.cast_rays(lengths, x, y, heading, vertices, offsets)
     rings = shapely.union_all([shapely.LinearRing(shape) for shape in shapes])
     for i, found in enumerate(lengths):
         angle = heading + 2 * np.pi * i / count

@@ -5,7 +5,8 @@ import pytest
 import shapely
 from conftest import SQUARE
 
-from pushplan.motion.collision import footprint, is_free, obstacles
+from pushplan.core import motion as core
+from pushplan.motion.collision import footprint, obstacles
 from pushplan.world import RobotModel, StaticMap
 from pushplan.world.outline import transform
 
@@ -19,13 +20,12 @@ def test_free_poses_are_those_that_shapely_finds(count: int) -> None:
     )
     posts = [SQUARE * rng.uniform(0.05, 0.8, 2) + at for at in rng.uniform(0, 30, (count, 2))]
     static = StaticMap.build(posts, bounds=[0, 0, 30, 30])
-    shape, among = footprint(robot), obstacles(static)
+    checker = core.CollisionChecker(footprint(robot), obstacles(static))
     walls = shapely.union_all([shapely.Polygon(post) for post in posts])
-    scratch = np.empty_like(shape.vertices)
     for pose in rng.uniform([-1, -1, -3], [31, 31, 3], (300, 3)):
         inside = bool(np.all((pose[:2] >= 0.0) & (pose[:2] <= 30.0)))
         hull = shapely.Polygon(transform(pose, plank))
-        assert is_free(pose, shape, among, scratch) == (inside and not hull.intersects(walls))
+        assert checker.is_free(pose) == (inside and not hull.intersects(walls))
 
 
 def test_wheels_push_but_do_not_count_at_walls() -> None:
@@ -39,7 +39,6 @@ def test_wheels_push_but_do_not_count_at_walls() -> None:
     )
     for one, free in ((robot, True), (whole, False)):
         for margin in (0.0, 0.05):
-            shape = footprint(one, margin)
-            scratch = np.empty_like(shape.vertices)
-            assert is_free(np.zeros(3), shape, obstacles(wall), scratch) == free
+            checker = core.CollisionChecker(footprint(one, margin), obstacles(wall))
+            assert checker.is_free(np.zeros(3)) == free
     assert len(robot.vertices) == 8 and robot.circumscribed_radius == whole.circumscribed_radius

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from ompl import base
 
-from pushplan.motion.dubins import along_arc, dubins, sample_pieces
+from pushplan.core import motion as core
 
 
 @pytest.mark.parametrize("radius", [0.1, 1.3, 7.0])
@@ -26,9 +26,9 @@ def test_lengths_and_ends_agree_with_ompl(radius):
             state.setX(pose[0])
             state.setY(pose[1])
             state.setYaw(pose[2])
-        length = dubins(start, end, radius, pieces)
+        length = core.dubins(start, end, radius, pieces)
         assert length == pytest.approx(space.distance(first, second), abs=1e-9)
-        count = sample_pieces(start, pieces, 0.05 * radius, poses, bends)
+        count = core.sample_pieces(start, pieces, 0.05 * radius, poses, bends)
         miss = poses[count - 1] - end
         miss[2] = (miss[2] + np.pi) % (2 * np.pi) - np.pi
         assert np.abs(miss).max() < 1e-9 * max(1, radius)
@@ -38,11 +38,11 @@ def test_lengths_and_ends_agree_with_ompl(radius):
 def test_equal_poses_need_no_path():
     pieces = np.full((3, 2), np.nan)
     pose = np.array([1.0, 2.0, 0.5])
-    assert dubins(pose, pose, 1.0, pieces) == pytest.approx(0.0, abs=1e-6)
+    assert core.dubins(pose, pose, 1.0, pieces) == pytest.approx(0.0, abs=1e-6)
     assert np.isfinite(pieces).all()
 
 
 def test_a_quarter_turn():
     end = np.empty(3)
-    along_arc(np.zeros(3), np.pi / 2, 1.0, end)
+    core.along_arc(np.zeros(3), np.pi / 2, 1.0, end)
     assert end == pytest.approx([1.0, 1.0, np.pi / 2])

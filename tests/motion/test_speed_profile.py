@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from conftest import SQUARE
 
-from pushplan.motion.path_problem import make_swept_path
 from pushplan.motion.speed_profile import timed_plan
+from pushplan.motion.swept_path import make_swept_path
 from pushplan.world import GoalDisc, Movables, RobotModel, StaticMap, World
 
 

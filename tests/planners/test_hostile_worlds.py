@@ -13,8 +13,8 @@ from shapely import Polygon
 from shapely.ops import unary_union
 
 from pushplan.control import TwistLimiter
+from pushplan.core import motion as core
 from pushplan.interaction import QuasiStatic
-from pushplan.motion.dubins import along_arc
 from pushplan.planners import make_planner, make_policy, planner_names, policy_for
 from pushplan.planners.rrt import GeometricRRT, GeometricRRTConfig, KinodynamicRRT
 from pushplan.world import (
@@ -244,7 +244,7 @@ def test_headings_may_be_given_with_any_number_of_turns():
     path = np.empty((60, 3))
     path[0] = [11.25, 3.75, np.pi / 2]
     for i in range(1, 60):
-        along_arc(path[i - 1], 0.1, 0.05, path[i])
+        core.along_arc(path[i - 1], 0.1, 0.05, path[i])
     turned = path + np.outer(np.arange(60) % 3, [0, 0, 2 * np.pi])
     plain, wound = (QuasiStatic().sweep(world, p) for p in (path, turned))
     assert wound.work == pytest.approx(plain.work, abs=1e-9)

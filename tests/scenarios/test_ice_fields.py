@@ -13,8 +13,8 @@ from conftest import quickest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from pushplan.core import scenarios as core
 from pushplan.scenarios import FloeSizes, generate_ice
-from pushplan.scenarios.floe_kernels import Discs, IceWater, Outlines, cut_cells, fit_floes
 from pushplan.world import InvalidInputError, ScenarioError, stream
 from pushplan.world.outline import convex_outline
 
@@ -213,16 +213,12 @@ def test_cells_and_floes_agree_with_shapely():
         block = np.array([[2.6, 2.7], [3.5, 2.7], [3.3, 3.4], [2.6, 3.2]])
         pairs = np.concatenate([np.delete(np.arange(count), k) for k in range(count)])
         offsets = np.arange(count + 1) * (count - 1)
-        discs = Discs(centres, weights, np.full(count, reach), pairs, offsets)
-        parts = (np.array([0.0, 0.0, 6.0, 6.0]), block, np.array([0, 4]))
-        for part in parts:
-            part.setflags(write=False)  # as in the generator: another kernel otherwise
-        water = IceWater(*parts, gap)
-        cells, sizes = cut_cells(discs, water)
-        shapes = Outlines(np.repeat(octagon[None], count, axis=0), np.full(count, 8))
-        floes, corners = fit_floes(
-            shapes, centres, Outlines(cells, sizes), np.full(count, 0.8), 1.8
-        )
+        water = core.IceWater(np.array([0.0, 0.0, 6.0, 6.0]), block, np.array([0, 4]), gap)
+        reaches = np.full(count, reach)
+        cells, sizes = core.cut_cells(centres, weights, reaches, pairs, offsets, water)
+        shapes = np.repeat(octagon[None], count, axis=0), np.full(count, 8)
+        areas = np.full(count, 0.8)
+        floes, corners = core.fit_floes(*shapes, centres, cells, sizes, areas, 1.8)
         for k in range(count):
             cell = shapely.Polygon(cells[k, : sizes[k]])
             wanted = reference_cell(

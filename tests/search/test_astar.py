@@ -10,7 +10,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from pushplan.compiled import kernel
-from pushplan.motion.dubins import along_arc
+from pushplan.core import motion as core
 from pushplan.motion.state_lattice.lattice_builder import dubins_to_line
 from pushplan.motion.state_lattice.primitive_set import PrimitiveConfig
 from pushplan.motion.state_lattice.primitives import generate, primitives
@@ -128,7 +128,7 @@ def test_primitives_join_lattice_states(headings: int, radius: float) -> None:
         pose = np.array([0.0, 0.0, motions.angles[motions.heading_of(p)]])
         for length, bend in motions.pieces[p]:
             assert abs(bend) <= 1.0 / radius + 1e-12
-            along_arc(pose.copy(), length, bend, pose)
+            core.along_arc(pose.copy(), length, bend, pose)
         x, y, heading = motions.ends[p]
         assert pose[:2] == pytest.approx([x, y], abs=1e-6)
         turn = pose[2] - motions.angles[heading]
@@ -162,7 +162,7 @@ def test_no_drivable_path_is_shorter_than_the_bound(
     for k, bend in enumerate(bends):
         # half of the steps steer home, so that some paths are nearly the shortest
         turn = bend if k % 2 else -np.sign(pose[2])
-        along_arc(pose.copy(), 0.1, float(turn), pose)
+        core.along_arc(pose.copy(), 0.1, float(turn), pose)
         if pose[0] >= distance:
             assert 0.1 * (k + 1) >= bound - 1e-6
             return

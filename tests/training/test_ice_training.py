@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pushplan.compiled import owned
+from pushplan.core import interaction as core
 from pushplan.interaction.network import IceNetwork
 from pushplan.training import ice_data, ice_evaluation
 from pushplan.training.ice_data import IcePairs, read_shards, write_shard, write_shards
@@ -39,12 +39,10 @@ class TestPassages:
             3, "train", PassageConfig(passages=8, greatest_concentration=0.25)
         )
         for passage, frame, after in zip(made.passages, made.frames, truth.after, strict=True):
-            from pushplan.interaction.occupancy_kernels import cover_sweep
-
             hull = np.empty((40, 40), np.float32)
             robot = passage.world.robot
-            shape = (owned(robot.vertices), owned(robot.offsets))
-            cover_sweep(owned(passage.path[-1:]), *shape, owned(frame), made.cell, hull)
+            shape = (robot.vertices, robot.offsets, frame, made.cell)
+            core.cover_sweep(passage.path[-1:], *shape, hull)
             assert (after * (hull > 0.99)).sum() < 0.05 * hull.sum()
 
     def test_voyages_can_be_driven(self):

@@ -5,23 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import partial
 
-import numpy as np
-
-from pushplan.compiled import owned
 from pushplan.control.limits import driven_twist
-from pushplan.control.mpc.assembly_kernels import assembly_memory
-from pushplan.control.mpc.horizon import FAILED, make_horizon, solve_rounds, track_of
+from pushplan.control.mpc.horizon import Horizon, make_horizon, solve_rounds, track_of
 from pushplan.control.mpc.mpc_config import MpcConfig
 from pushplan.control.mpc.quadratic_program import ProgramSolver
-from pushplan.control.mpc.tracker_kernels import (
-    TrackerMemory,
-    assemble_step,
-    begin_step,
-    begin_track,
-    finish_step,
-)
-from pushplan.control.mpc.tracking_kernels import Tuning
 from pushplan.control.staged_controller import StagedController
+from pushplan.core import control as core
 from pushplan.world import Drive, Plan, RobotModel, Twist, World
 from pushplan.world.checks import expect
 
@@ -51,20 +40,17 @@ class MpcTracker(StagedController):
         self._robot: RobotModel | None = None
         self._plan: Plan | None = None
         self._hold_commands(self.config.period)
-        self._out = np.zeros(2)
-        self._memory: TrackerMemory | None = None
-        self._earlier = 0  # failures of memories before
+        self._horizon: Horizon | None = None
+        self._earlier = 0  # failures of horizons before
 
     @property
     def fallbacks(self) -> int:
         """Calls since the start of the episode in which the solver gave no solution."""
-        if self._memory is None:
-            return self._earlier
-        return self._earlier + int(self._memory.horizon.counts[FAILED])
+        return self._earlier + (self._horizon.failures if self._horizon else 0)
 
     def reset(self, world: World) -> None:
         """See `pushplan.world.Controller`."""
-        self._memory = None
+        self._horizon = None
         self._earlier = 0
         super().reset(world)
 
@@ -74,58 +60,57 @@ class MpcTracker(StagedController):
     def _follow(self, world: World, plan: Plan) -> Twist:
         """Start afresh in a new episode, on a new plan, or where the robot is another one."""
         if self._robot is not world.robot and self._robot != world.robot:
-            self._robot = world.robot
-            self._plan = None
-            self._earlier = self.fallbacks
-            self._memory = tracker_memory(world.robot, self.config)
-            program = self._memory.horizon.program
-            self._solver = ProgramSolver(
-                program, self.config.tolerance, self.config.solver_iterations
-            )
-            driven = driven_twist(world)
-            self._memory.horizon.last[:] = driven.linear, driven.angular
-        memory = self._memory
-        out = self._out
-        assert memory is not None
+            self._prepare(world)
+        horizon = self._horizon
+        tracker = self._tracker
+        assert horizon is not None
         if plan is not self._plan:
             self._plan = plan
             self._track = track_of(plan)
-            begin_track(memory)
-        pose = owned(world.robot_pose)
+            tracker.begin_track()
+        pose = world.robot_pose
         time = world.time
         held = self._clock.held
-        if begin_step(memory, self._track, pose, time, held, out):
-            solved = solve_rounds(
-                memory.horizon,
-                self._solver,
-                self.config.iterations,
-                self.config.first_iterations,
-                partial(assemble_step, memory, self._track),
-            )
-            finish_step(memory, self._track, pose, time, held, solved, out)
-        return Twist(float(out[0]), float(out[1]))
+        known = tracker.begin_step(self._track, pose, time, held)
+        if known is not None:
+            return Twist(*known)
+        solved = solve_rounds(
+            horizon,
+            self._solver,
+            self.config.iterations,
+            self.config.first_iterations,
+            partial(tracker.assemble_step, self._track),
+        )
+        return Twist(*tracker.finish_step(self._track, pose, time, held, solved))
 
-
-def tracker_memory(robot: RobotModel, config: MpcConfig) -> TrackerMemory:
-    """Parameters and memory of the kernels for one robot."""
-    columns = (1, 0) if _optimises_speed(robot, config) else (1,)
-    return TrackerMemory(
-        make_horizon(robot, columns, config.horizon, config.horizon),
-        _tuning(robot, config),
-        config.reach * robot.circumscribed_radius / robot.max_speed,
-        config.delay,
-        np.zeros(3),
-        np.zeros(1),
-        assembly_memory(len(columns) * config.horizon),
-    )
+    def _prepare(self, world: World) -> None:
+        """Set up the problem of another robot."""
+        robot = world.robot
+        config = self.config
+        self._robot = robot
+        self._plan = None
+        self._earlier = self.fallbacks
+        columns = (1, 0) if _optimises_speed(robot, config) else (1,)
+        self._horizon = make_horizon(robot, columns, config.horizon, config.horizon)
+        self._solver = ProgramSolver(
+            self._horizon.program, config.tolerance, config.solver_iterations
+        )
+        driven = driven_twist(world)
+        self._horizon.last[:] = driven.linear, driven.angular
+        self._tracker = core.Tracker(
+            self._horizon.core,
+            _tuning(robot, config),
+            span=config.reach * robot.circumscribed_radius / robot.max_speed,
+            delay=config.delay,
+        )
 
 
 def _optimises_speed(robot: RobotModel, config: MpcConfig) -> bool:
     return config.optimise_speed and robot.drive is Drive.DIFFERENTIAL
 
 
-def _tuning(robot: RobotModel, config: MpcConfig) -> Tuning:
-    return Tuning(
+def _tuning(robot: RobotModel, config: MpcConfig) -> core.Tuning:
+    return core.Tuning(
         size=robot.circumscribed_radius,
         max_speed=robot.max_speed,
         max_turn_rate=robot.max_turn_rate,

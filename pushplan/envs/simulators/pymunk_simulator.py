@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pushplan.core import envs as core
 from pushplan.envs.simulators.base import (
     Materials,
     Simulator,
@@ -19,9 +20,8 @@ from pushplan.envs.simulators.base import (
 from pushplan.envs.simulators.momentum import Momentum
 from pushplan.envs.simulators.pymunk_bodies import PymunkBodies
 from pushplan.envs.simulators.pymunk_drive import PymunkDriver, PymunkOptions
-from pushplan.envs.simulators.reach import Shapes, arc_pose, clear_time, struck, within_reach
 from pushplan.envs.trace import Trace
-from pushplan.geometry.obstacles import obstacles_of
+from pushplan.geometry.obstacles import core_obstacles
 from pushplan.interaction.interaction_model import Interaction
 from pushplan.world import Twist, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, frozen, number
@@ -61,13 +61,8 @@ class PymunkSimulator(Simulator):
             self._size = max(float(min(np.median(radii), 4.0 * radii.min())), least)
         self._materials = materials
         self._world = world
-        self._obstacles = obstacles_of(world.static)
-        movables = world.movables
-        self._shapes = Shapes(
-            robot.vertices, robot.offsets, movables.vertices, movables.offsets, movables.radii
-        )
         self._momentum = Momentum.of(world, materials)
-        self._driver = self._make_driver()
+        self._connect()
         self._time = world.time
         assert world.robot_twist is not None
         robot_row = np.concatenate([world.robot_pose, world.robot_twist])
@@ -75,24 +70,31 @@ class PymunkSimulator(Simulator):
         self._rows = np.concatenate([robot_row[None], objects])  # (1 + K, 6) poses and twists
         self._held = self._touched = False
 
-    def _make_driver(self) -> PymunkDriver:
+    def _connect(self) -> None:
+        """Make the objects of the engine and of the core, which the rest decides."""
         options = self.options
+        robot = self._world.robot
+        movables = self._world.movables
         bodies = PymunkBodies(
             self._world,
             self._materials,
             slop=options.slop * self._size,
             iterations=options.iterations,
         )
-        return PymunkDriver(bodies, self._world.robot, options, self._size)
+        self._driver = PymunkDriver(bodies, robot, options, self._size)
+        self._reach = core.Reach(
+            robot.vertices, robot.offsets, movables.vertices, movables.offsets, movables.radii
+        )
 
     def __getstate__(self) -> dict[str, Any]:
-        """Everything but the engine's own objects, which the rest decides."""
-        return {key: value for key, value in self.__dict__.items() if key != "_driver"}
+        """Everything but what `_connect` makes."""
+        made = ("_driver", "_reach")
+        return {key: value for key, value in self.__dict__.items() if key not in made}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         if "_world" in state:
-            self._driver = self._make_driver()
+            self._connect()
 
     def step(self, command: Twist, duration: float) -> Trace:
         """Drive at a body-frame velocity for ``duration`` [s]."""
@@ -147,7 +149,7 @@ class PymunkSimulator(Simulator):
             found = run(np.concatenate([self._rows[:1], self._rows[1 + active]]), active)
             paths = self._resting(len(found))
             paths[:, active] = found[:, 1:, :3]
-            missed = struck(loaded, paths, self._object_rows(), self._shapes)
+            missed = self._reach.struck(loaded, paths, self._object_rows())
             if not missed.any():
                 break
             loaded |= missed
@@ -166,7 +168,7 @@ class PymunkSimulator(Simulator):
     ) -> float:
         if self._object_speeds().any():
             return 0.0
-        return clear_time(
+        return self._reach.clear_time(
             self._rows[0, :3],
             course,
             linear,
@@ -174,9 +176,8 @@ class PymunkSimulator(Simulator):
             holds,
             limit,
             self.options.travel * self._size,
-            self._shapes,
             self._object_rows(),
-            self._obstacles,
+            core_obstacles(self._world.static),
         )
 
     def _object_rows(self) -> FloatArray:
@@ -197,7 +198,7 @@ class PymunkSimulator(Simulator):
         w = command.angular
         for i in range(samples):
             time = duration * (i + 1) / samples
-            arc_pose(start, start[2], v, w, self.options.holds_direction, time, poses[i])
+            core.arc_pose(start, start[2], v, w, self.options.holds_direction, time, poses[i])
         if samples:
             theta = poses[-1, 2]
             self._rows[1:, 3:] = 0.0
@@ -228,7 +229,7 @@ class PymunkSimulator(Simulator):
         return speeds
 
     def _in_reach(self, reach: float, own: FloatArray) -> BoolArray:
-        return within_reach(self._rows[0, :3], reach, self._shapes, self._object_rows(), own)
+        return self._reach.within(self._rows[0, :3], reach, self._object_rows(), own)
 
     def follow(self, path: ArrayLike) -> Interaction:
         """Sweep the robot straight from pose to pose at its full speed."""

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pushplan.compiled import owned
+from pushplan.core import motion as core
 from pushplan.interaction import InteractionModel
-from pushplan.motion.collision import first_blocked, footprint, obstacles, static_depth
+from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.keyholes.disc_space import DiscSpace, DiscState
 from pushplan.motion.keyholes.keyhole_config import KeyholeConfig
 from pushplan.motion.keyholes.line_pushes import (
@@ -130,9 +130,9 @@ class KeyholeSearch:
         self._size = size
         self._longest = config.longest * size
         self._space = _disc_space(world, config, lambda: stopped(count[0]))
-        self._shape = footprint(world.robot, config.margin * size)
-        self._bare = footprint(world.robot)
-        self._walls = obstacles(world.static)
+        walls = obstacles(world.static)
+        self._checker = core.CollisionChecker(footprint(world.robot, config.margin * size), walls)
+        self._bare = core.CollisionChecker(footprint(world.robot), walls)
         self._numbers = itertools.count()
         self._open: list[tuple[float, int, int, KeyholeEnd]] = []
         """Priority, running number, rank and scene."""
@@ -185,9 +185,7 @@ class KeyholeSearch:
 
     def _hits_wall(self, path: FloatArray) -> bool:
         """Return True if the robot gets deeper into walls on poses (N, 3) than at the first."""
-        shape = self._bare
-        scratch = np.empty_like(self._bare.vertices)
-        first, *others = (static_depth(pose, shape, self._walls, scratch) for pose in owned(path))
+        first, *others = (self._bare.depth(pose) for pose in path)
         return any(depth > first + 1e-9 for depth in others)
 
     def _put(self, end: KeyholeEnd) -> None:
@@ -235,9 +233,7 @@ class KeyholeSearch:
         self._count[0] += 1
         config = self.config
         size = self._size
-        free = first_blocked(
-            owned(path), len(path), self._shape, self._walls, np.empty_like(self._shape.vertices)
-        )
+        free = self._checker.first_blocked(path)
         scene = self.world.moved(robot_pose=path[0], movable_poses=end.state.poses)
         swept = self.interaction.sweep(scene, path[: max(free, 1)])
         last = free - 1 if swept.jammed_at < 0 else swept.jammed_at - 1

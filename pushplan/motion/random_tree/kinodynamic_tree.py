@@ -5,7 +5,7 @@ motion towards them, and for the goal. A control is a curvature. Its Python bind
 no constructor for a directed control sampler, so the propagator tries several curvatures and puts
 the one that gets nearest to the target in the place of OMPL's sample. The length of the arc, and
 how far the way leads back in all, are part of the state that it leads to, with no weight in the
-distance of two states, which is that of `steer`.
+distance of two states, which is that of the core's `Steering`.
 """
 
 from __future__ import annotations
@@ -17,9 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from ompl import base, control, util
 
-from pushplan.compiled import copy_into, kernel
-from pushplan.motion.collision import ConvexObstacles, Footprint, is_free
-from pushplan.motion.dubins import along_arc, step_along
+from pushplan.core import motion as core
 from pushplan.motion.random_tree.ompl_calls import (
     GoalRegion,
     grow_to,
@@ -45,56 +43,6 @@ _PLACE, _HEADING, _DRIVEN = range(3)  # the parts of a state, of which the last 
 _LENGTH, _BACK = range(2)  # length of the arc that led there, and of all that leads back [m]
 
 
-@kernel(allocates=True)
-def steer(
-    start: FloatArray,  # (3,)
-    target: FloatArray,  # (3,)
-    sampled: float,  # a random curvature [1/m]; the others are spread evenly or aim at the target
-    limits: TreeLimits,
-    shape: Footprint,
-    among: ConvexObstacles,
-    scratch: FloatArray,  # memory for the footprint's corners
-    out: FloatArray,  # (3,) receives the end of the arc
-) -> tuple[float, float]:
-    """Curvature and length of the free arc nearest to a target, of seven; length 0: blocked.
-
-    Where it may lead back there are seven more, whose lengths are negative.
-    """
-    bound, longest, spacing, turn_weight, backward = limits
-    dx = target[0] - start[0]
-    dy = target[1] - start[1]
-    side = -np.sin(start[2]) * dx + np.cos(start[2]) * dy
-    aimed = 2.0 * side / max(dx * dx + dy * dy, 1e-12)  # the circle through both, tangent here
-    best = np.inf
-    best_curvature = 0.0
-    best_length = 0.0
-    pose = np.empty(3)
-    for arc in range(14 if backward > 0.0 else 7):
-        i = arc % 7
-        signed = longest if arc < 7 else -min(longest, backward)
-        if i == 0:
-            curvature = sampled
-        elif i == 1:
-            curvature = min(max(aimed, -bound), bound)
-        else:
-            curvature = bound * (0.5 * (i - 2) - 1.0)
-        steps = int(np.ceil(abs(signed) / step_along(curvature, spacing)))
-        for step in range(1, steps + 1):
-            length = signed * step / steps
-            along_arc(start, length, curvature, pose)
-            if not is_free(pose, shape, among, scratch):
-                break
-            turn = abs((pose[2] - target[2] + np.pi) % (2.0 * np.pi) - np.pi)
-            miss = np.sqrt((pose[0] - target[0]) ** 2 + (pose[1] - target[1]) ** 2)
-            miss += turn_weight * turn
-            if miss < best:
-                best = miss
-                best_curvature = curvature
-                best_length = length
-                copy_into(out, pose)
-    return best_curvature, best_length
-
-
 @dataclass(eq=False)
 class TreeGrowth:
     """A tree that grows from ``start`` to ``goal``: what OMPL's callbacks need."""
@@ -103,11 +51,20 @@ class TreeGrowth:
     goal: NavigationGoal
     targets: Callable[[], FloatArray]  # gives the next (3,) pose to grow towards
     limits: TreeLimits  # of the edges
-    shape: Footprint  # of the robot
-    among: ConvexObstacles  # obstacles that it must not touch
+    bounds: FloatArray  # (4,) of the workspace [m]
+    shape: core.Footprint  # of the robot
+    among: core.ConvexObstacles  # obstacles that it must not touch
 
     def __post_init__(self) -> None:
-        self.scratch = np.empty_like(self.shape.vertices)
+        limits = self.limits
+        self.steering = core.Steering(
+            limits.max_curvature,
+            limits.edge_length,
+            limits.spacing,
+            limits.turn_weight,
+            self.shape,
+            self.among,
+        )
         self.origin = np.empty(3)
         self.end = np.empty(3)
         self.target = np.empty(3)
@@ -131,7 +88,7 @@ class TreeGrowth:
 
     def _run(self, seed: int, done: Callable[[], bool]) -> FloatArray | None:
         space = _state_space(self.limits.turn_weight)
-        space.getSubspace(_PLACE).setBounds(plane_bounds(self.among.bounds))
+        space.getSubspace(_PLACE).setBounds(plane_bounds(self.bounds))
         controls = control.RealVectorControlSpace(space, 1)
         curvatures = base.RealVectorBounds(1)
         curvatures.setLow(-self.limits.max_curvature)
@@ -165,22 +122,12 @@ class TreeGrowth:
         self, state: base.State, action: control.Control, duration: float, result: base.State
     ) -> None:
         """Drive towards the target; the control becomes the curvature that was driven."""
-        limits = self.limits
         back = state[_DRIVEN][_BACK]
-        if limits.backward > 0.0:
-            limits = limits._replace(backward=limits.backward - back)
         self.origin[0] = state[_PLACE][0]
         self.origin[1] = state[_PLACE][1]
         self.origin[2] = state[_HEADING].value
-        curvature, length = steer(
-            self.origin,
-            self.target,
-            action[0],
-            limits,
-            self.shape,
-            self.among,
-            self.scratch,
-            self.end,
+        curvature, length = self.steering.steer(
+            self.origin, self.target, action[0], self.limits.backward - back, self.end
         )
         self.moved = length != 0.0
         if not self.moved:

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pushplan.compiled import owned
+from pushplan.core import motion as core
 from pushplan.geometry import VisibilityGraph
 from pushplan.motion.coarse_path import coarse_path, reachable
-from pushplan.motion.collision import footprint, is_free, obstacles
+from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_improver import Candidate, PathImprover
 from pushplan.motion.path_search_config import EDGE
@@ -62,8 +62,7 @@ class TreePaths:
 
     def _gets_away(self) -> bool:
         improver = self._improver
-        radius = improver.problem.turning_radius
-        return gets_away(improver.room, improver.lead.pose, improver.size, radius)
+        return gets_away(improver.room, improver.lead.pose, improver.size, improver.turning_radius)
 
     def change_start(self) -> None:
         """Begin in another way, after what was tried has failed.
@@ -86,7 +85,7 @@ class TreePaths:
         if not improver.relaxed:
             tightest = max(robot.turning_radius, TIGHTEST * improver.size)
             bare = improver.room._replace(footprint=footprint(robot))
-            pose = owned(improver.world.robot_pose)
+            pose = improver.world.robot_pose
             self.boxed_in = is_boxed_in(robot, bare, pose, tightest, improver.stopped)
 
     def grow_two(self, push_weight: float) -> Iterator[Candidate]:
@@ -109,16 +108,16 @@ class TreePaths:
         """The path of a new tree."""
         improver = self._improver
         world = self._improver.world
-        problem = self._improver.problem
+        room = self._improver.room
         size = improver.size
         self.trees += 1
         improver.iterations += 1
-        among = problem.walls
-        shape = problem.footprint
+        among = room.walls
+        shape = room.footprint
         if np.isinf(push_weight):
             boxes = unflatten(world.movables.vertices_world, world.movables.offsets)
             among = obstacles(keep_out(world), boxes)
-            if not is_free(improver.lead.pose, shape, among, np.empty_like(shape.vertices)):
+            if not core.CollisionChecker(shape, among).is_free(improver.lead.pose):
                 return None  # the robot touches an object already: only pushing helps
         coarse = coarse_path(world, push_weight, improver.stopped)
         if improver.stopped():
@@ -141,15 +140,18 @@ class TreePaths:
             return improver.iterations >= last or improver.stopped()
 
         limits = TreeLimits(
-            max_curvature=1.0 / problem.turning_radius,
+            max_curvature=1.0 / improver.turning_radius,
             edge_length=EDGE * size,
-            spacing=problem.spacing,
+            spacing=room.spacing,
             turn_weight=0.5 * size,
             backward=improver.backward,
         )
         spread = _COARSE_PATH_SPREAD * size
-        targets = Targets(coarse, self._fraction, spread, world.static.bounds, improver.rng)
-        growth = TreeGrowth(improver.lead.pose, improver.goal, targets, limits, shape, among)
+        bounds = world.static.bounds
+        targets = Targets(coarse, self._fraction, spread, bounds, improver.rng)
+        growth = TreeGrowth(
+            improver.lead.pose, improver.goal, targets, limits, bounds, shape, among
+        )
         arcs = growth.grow(int(improver.rng.integers(1, 2**31)), done, improver.stopped)
         if arcs is None:
             return None

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
+from pushplan.core import motion as core
 from pushplan.motion.state_lattice.frame import Frame
 from pushplan.motion.state_lattice.pose_lattice import PoseLattice
 from pushplan.motion.state_lattice.primitive_set import PrimitiveSet
@@ -15,11 +17,16 @@ from pushplan.world.checks import FloatArray
 class BuiltLattice:
     """A lattice among the things of one world."""
 
-    lattice: PoseLattice  # for the search
+    lattice: PoseLattice
     frame: Frame  # in which it lies; its origin is the robot
     motions: PrimitiveSet  # its primitives
     start: tuple[int, int, float]  # row, column and heading [rad] of the robot
     arrives: bool  # True if the goal of the lattice is that of the world, not one before it
+
+    @cached_property
+    def graph(self) -> core.PoseLattice:
+        """The lattice as the core searches it."""
+        return core.PoseLattice(*self.lattice)
 
     def node(self, heading: int, row: int, column: int) -> int:
         """Number of a node."""

@@ -8,14 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pushplan.core import motion as core
 from pushplan.geometry import transform_outlines
-from pushplan.motion.state_lattice.cost_map import (
-    FloeCosts,
-    PlacedFloes,
-    add_floes,
-    block,
-    prefix_sums,
-)
+from pushplan.motion.state_lattice.cost_map import FloeCosts, column_sums
 from pushplan.motion.state_lattice.frame import Frame
 from pushplan.motion.time_slicing import go_on, never
 from pushplan.world import Movables, StaticMap
@@ -49,25 +44,25 @@ class LatticeMap:
         """(columns, rows + 1) sums of the costs of each column before each row [m]."""
         corners = np.empty_like(floes.vertices)
         transform_outlines(floes.poses, floes.vertices, floes.offsets, corners)
-        placed = PlacedFloes(
-            np.ascontiguousarray(self.to_cells(corners)),
-            floes.offsets,
-            np.ascontiguousarray(self.to_cells(floes.poses[:, :2])),
-            np.sqrt(costs.areas / np.pi) / self.cell,
-            costs,
-        )
+        outlines = np.ascontiguousarray(self.to_cells(corners))
+        centres = np.ascontiguousarray(self.to_cells(floes.poses[:, :2]))
+        radii = np.sqrt(costs.areas / np.pi) / self.cell  # of the discs of the same areas
         grid = np.zeros(self.shape)
         for first in range(0, len(floes), _FEW):
             go_on(stopped)
             few = slice(first, first + _FEW)
-            part = costs._replace(totals=costs.totals[few], areas=costs.areas[few])
-            offsets = placed.offsets[first : first + _FEW + 1]
-            add_floes(
-                PlacedFloes(placed.outlines, offsets, placed.centres[few], placed.radii[few], part),
+            core.add_floes(
+                outlines,
+                floes.offsets[first : first + _FEW + 1],
+                centres[few],
+                radii[few],
+                costs.totals[few],
+                costs.exponent,
+                costs.soft,
                 grid,
             )
         go_on(stopped)
-        return prefix_sums(grid)
+        return column_sums(grid)
 
     def no_costs(self) -> FloatArray:
         """`cost_sums` where there is nothing."""
@@ -82,9 +77,9 @@ class LatticeMap:
         outlines = np.ascontiguousarray(self.to_cells(vertices))
         for first in range(0, len(offsets) - 1, _FEW):
             go_on(stopped)
-            block(outlines, offsets[first : first + _FEW + 1], _BLOCKED_MARGIN, grid)
+            core.block(outlines, offsets[first : first + _FEW + 1], _BLOCKED_MARGIN, grid)
         go_on(stopped)
-        return prefix_sums(grid).ravel()
+        return column_sums(grid).ravel()
 
     def columns_between(
         self, static: StaticMap, side: float, low: int, high: int

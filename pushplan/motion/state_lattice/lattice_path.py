@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from pushplan.compiled import owned
-from pushplan.motion.dubins import along_arc, sample_pieces
-from pushplan.motion.goal_region import goal_numbers, in_goal
-from pushplan.motion.path_problem import SweptPath
+from pushplan.core import motion as core
+from pushplan.motion.goal_region import goal_numbers
 from pushplan.motion.state_lattice.built_lattice import BuiltLattice
 from pushplan.motion.state_lattice.lattice_config import SPACING, LatticeConfig
+from pushplan.motion.swept_path import SweptPath
 from pushplan.world import GoalLine, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import arc_lengths
@@ -24,7 +23,7 @@ def sample_arcs(
     poses = np.empty((capacity, 3))
     curvatures = np.zeros(capacity)
     poses[0] = start
-    count = 1 + sample_pieces(owned(start), arcs, spacing, poses[1:], curvatures[1:])
+    count = 1 + core.sample_pieces(start, arcs, spacing, poses[1:], curvatures[1:])
     return poses[:count], curvatures[:count]
 
 
@@ -44,7 +43,7 @@ def lay_path(
         inside = np.flatnonzero((poses[:, :2] - point) @ normal >= -1e-9 * size)
     else:
         numbers = goal_numbers(goal, config.inset * size)
-        inside = np.flatnonzero([in_goal(x, y, numbers) for x, y in poses[:, :2]])
+        inside = np.flatnonzero([core.in_goal(x, y, numbers) for x, y in poses[:, :2]])
     end = int(inside[0]) + 1 if len(inside) else len(poses)
     poses = poses[:end].copy()
     curvatures = curvatures[:end].copy()
@@ -63,12 +62,12 @@ def _cut_at_line(
     high = spacing
     for _ in range(50):
         middle = 0.5 * (low + high)
-        along_arc(before, middle, curvature, out)
+        core.along_arc(before, middle, curvature, out)
         if float((out[:2] - point) @ normal) < 0.0:
             low = middle
         else:
             high = middle
-    along_arc(before, high, curvature, out)
+    core.along_arc(before, high, curvature, out)
 
 
 def bare_path(poses: FloatArray, curvatures: FloatArray) -> SweptPath:

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pushplan.compiled import kernel, owned
+from pushplan.core import motion as core
 from pushplan.errors import InvalidInputError
-from pushplan.motion.dubins import sample_pieces
 from pushplan.world.checks import (
     ArrayRecord,
     FloatArray,
@@ -73,7 +72,9 @@ class PrimitiveSet(ArrayRecord):
     def boxes(self) -> FloatArray:
         """(P, 4) least and greatest x and y along each primitive [steps]."""
         headings = np.repeat(self.angles, np.diff(self.first))
-        return frozen(_boxes(headings, owned(self.pieces), owned(self.lengths)))
+        boxes = np.empty((len(self), 4))
+        core.primitive_boxes(headings, self.pieces, self.lengths, boxes)
+        return frozen(boxes)
 
     @functools.cached_property
     def bulge(self) -> int:
@@ -88,24 +89,6 @@ class PrimitiveSet(ArrayRecord):
     def heading_of(self, primitive: int) -> int:
         """Index of the heading at the start of a primitive."""
         return int(np.searchsorted(self.first, primitive, side="right")) - 1
-
-
-@kernel(allocates=True)
-def _boxes(headings: FloatArray, pieces: FloatArray, lengths: FloatArray) -> FloatArray:
-    """(P, 4) least and greatest x and y along arcs (P, 3, 2) from the origin."""
-    boxes = np.zeros((headings.shape[0], 4))
-    poses = np.empty((1000, 3))
-    curvatures = np.empty(1000)
-    start = np.zeros(3)
-    for p in range(headings.shape[0]):
-        start[2] = headings[p]
-        count = sample_pieces(start, pieces[p], 0.02 * lengths[p], poses, curvatures)
-        for i in range(count):
-            boxes[p, 0] = min(boxes[p, 0], poses[i, 0])
-            boxes[p, 1] = max(boxes[p, 1], poses[i, 0])
-            boxes[p, 2] = min(boxes[p, 2], poses[i, 1])
-            boxes[p, 3] = max(boxes[p, 3], poses[i, 1])
-    return boxes
 
 
 def directions(headings: int) -> IntArray:

@@ -13,9 +13,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pushplan.compiled import kernel
+from pushplan.core import motion as core
 from pushplan.geometry.angles import wrap_angle
-from pushplan.motion.dubins import dubins
 from pushplan.motion.state_lattice.primitive_set import (
     PrimitiveConfig,
     PrimitiveSet,
@@ -25,47 +24,6 @@ from pushplan.motion.state_lattice.primitive_set import (
 from pushplan.motion.time_slicing import go_on, never
 from pushplan.world.checks import FloatArray, IntArray, frozen
 
-
-@kernel(allocates=True)
-def fill_connections(
-    heading: float,  # at the origin [rad]
-    target: float,  # at the end [rad]
-    radius: float,  # turning radius [steps]
-    reach: int,  # greatest coordinate of an end [steps]
-    slack: float,  # greatest turn of a path beyond the change of heading [rad]
-    out: FloatArray,  # (M, 9) receives length, x, y, and the three pieces of each path
-) -> int:
-    """Write the Dubins paths from the origin without needless turns; returns their number."""
-    start = np.zeros(3)
-    end = np.empty(3)
-    pieces = np.empty((3, 2))
-    start[2] = heading
-    end[2] = target
-    change = abs(wrap_angle(target - heading))
-    count = 0
-    for x in range(-reach, reach + 1):
-        for y in range(-reach, reach + 1):
-            ahead = x * np.cos(heading) + y * np.sin(heading)
-            if ahead <= 0.0 or x * x + y * y > reach * reach or count == out.shape[0]:
-                continue
-            end[0] = x
-            end[1] = y
-            length = dubins(start, end, radius, pieces)
-            turn = 0.0
-            for i in range(3):
-                turn += abs(pieces[i, 0] * pieces[i, 1])
-            if turn > change + slack:
-                continue
-            out[count, 0] = length
-            out[count, 1] = x
-            out[count, 2] = y
-            for i in range(3):
-                out[count, 3 + 2 * i] = pieces[i, 0]
-                out[count, 4 + 2 * i] = pieces[i, 1]
-            count += 1
-    return count
-
-
 _MOST_TURN = 1.3  # greatest change of heading along one primitive [rad]
 _SLACK = 0.35  # greatest turn of a primitive beyond its change of heading [rad]
 
@@ -74,7 +32,7 @@ def connections(heading: float, target: float, config: PrimitiveConfig, slack: f
     """(W, 9) length, end and pieces of paths from the origin, shortest first, ties by ends."""
     reach = int(np.ceil(1.7 * config.radius)) + 4
     out = np.empty((4 * (reach + 1) ** 2, 9))
-    count = fill_connections(heading, target, config.radius, reach, slack, out)
+    count = core.fill_connections(heading, target, config.radius, reach, slack, out)
     rows = out[:count]
     order = np.lexsort((rows[:, 2], rows[:, 1], np.round(rows[:, 0], 9)))
     return rows[order]

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pushplan.core import motion as core
 from pushplan.motion.state_lattice.primitive_set import PrimitiveSet
-from pushplan.motion.state_lattice.swath_kernels import sweep_cells
 from pushplan.motion.time_slicing import go_on, never
 from pushplan.world.checks import FloatArray, IntArray
 
@@ -72,7 +72,7 @@ class _SwathMaker:
         primitives = self._primitives
         pieces = primitives.pieces[p] * np.array([cells, 1.0 / cells])
         heading = float(primitives.angles[primitives.heading_of(p)])
-        return sweep_cells(heading, pieces, self._vertices, self._offsets, self._reach, 0.5)
+        return core.sweep_cells(heading, pieces, self._vertices, self._offsets, self._reach, 0.5)
 
     @functools.cached_property
     def _swaths(self) -> Swaths:

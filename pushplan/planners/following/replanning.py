@@ -9,8 +9,9 @@ from typing import Annotated
 
 import numpy as np
 
+from pushplan.core import motion as core
 from pushplan.interaction import Interaction, InteractionModel
-from pushplan.motion.collision import first_blocked, footprint, obstacles
+from pushplan.motion.collision import footprint, obstacles
 from pushplan.world import GoalDisc, GoalLine, Plan, World
 from pushplan.world.checked_fields import CheckedFields, Limits, NonNegativeFloat
 from pushplan.world.checks import FloatArray
@@ -150,8 +151,7 @@ def free_length(world: World, path: FloatArray) -> float:
     fine = np.linspace(0.0, along[-1], 1 + math.ceil(along[-1] / (_SPACING * size)))
     poses = poses_at(fine, along, path)
     shape = footprint(world.robot, 0.5 * world.margin)
-    scratch = np.empty_like(shape.vertices)
-    first = first_blocked(poses, len(fine), shape, obstacles(world.static), scratch)
+    first = core.CollisionChecker(shape, obstacles(world.static)).first_blocked(poses)
     if first == len(fine):
         return math.inf
     return float(np.interp(fine[first], along, lengths))

@@ -8,12 +8,11 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from pushplan.compiled import owned
 from pushplan.errors import short
 from pushplan.planners.mppi.approach_grid import Approach
 from pushplan.planners.mppi.fields import CLEARANCE, Field, object_field, robot_field, sample
 from pushplan.planners.mppi.mppi_config import MppiConfig
-from pushplan.planners.mppi.rollout_kernels import BLOCKED, Rollouts
+from pushplan.planners.mppi.rollouts import BLOCKED, Rollouts
 from pushplan.world import InvalidInputError, World
 from pushplan.world.checks import FloatArray
 
@@ -231,7 +230,7 @@ def object_cost(world: World, push_weight: float, goal_weight: float) -> ObjectC
     sides = static.bounds[2:] - static.bounds[:2]
     return ObjectCost(
         field,
-        owned(goal_weight * (robot.mass + push_weight * movables.masses)),
+        goal_weight * (robot.mass + push_weight * movables.masses),
         done,
         goal_weight * _UNDONE * robot.mass * float(np.hypot(*sides)),
     )

@@ -7,9 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pushplan.compiled import kernel, owned
+from pushplan.core import geometry as core
 from pushplan.geometry import GeodesicField, GoalDistances, geodesic_field, goal_distances
-from pushplan.geometry.distance_field import sample_values
 from pushplan.motion.done_places import done_places
 from pushplan.world import ClearanceArea, Goal, ManipulationGoal, Receptacle, StaticMap
 from pushplan.world.checks import FloatArray, frozen
@@ -21,7 +20,7 @@ _OUTSET = 1.1  # the same from the edge of a clearance area
 
 
 class Field(NamedTuple):
-    """A distance field as kernels read it."""
+    """A distance field."""
 
     values: FloatArray  # (rows, columns) [m], finite
     x: float  # Least x of the grid [m]
@@ -32,17 +31,8 @@ class Field(NamedTuple):
 def sample(field: Field, points: FloatArray) -> FloatArray:
     """Distances (...) at points (..., 2) [m]."""
     out = np.empty(points.shape[:-1])
-    _sample(field, owned(points.reshape(-1, 2)), out.reshape(-1))
+    core.sample_points(*field, np.ascontiguousarray(points.reshape(-1, 2)), out.reshape(-1))
     return out
-
-
-@kernel
-def _sample(field: Field, points: FloatArray, out: FloatArray) -> None:
-    """Fill the distances (N,) at points (N, 2) [m]."""
-    for n in range(points.shape[0]):
-        x = points[n, 0]
-        y = points[n, 1]
-        out[n] = sample_values(field.values, field.x, field.y, field.cell, x, y)
 
 
 def finite(values: FloatArray) -> FloatArray:
@@ -92,7 +82,7 @@ def object_ways(
 def object_field(
     static: StaticMap, goal: ManipulationGoal, radius: float, clearance: float, cell: float
 ) -> Field:
-    """Lengths of `object_ways` for kernels; 0 beyond the edge of a clearance area too."""
+    """Lengths of `object_ways` on a grid; 0 beyond the edge of a clearance area too."""
     places = _places(goal, radius)
     found = geodesic_field(static, places, resolution=cell, clearance=clearance)
     values = found.filled

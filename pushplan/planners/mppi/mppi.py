@@ -17,8 +17,8 @@ from pushplan.planners.mppi.control_sequence import (
 )
 from pushplan.planners.mppi.costs import RolloutCost, total_cost
 from pushplan.planners.mppi.mppi_config import MppiConfig
-from pushplan.planners.mppi.rollout_kernels import Rollouts
 from pushplan.planners.mppi.rollout_model import RolloutModel
+from pushplan.planners.mppi.rollouts import Rollouts
 from pushplan.planners.mppi.update_rules import updated
 from pushplan.world import Plan, PlanResult, PlanStatus, Stop, World
 from pushplan.world.checks import FloatArray, expect
@@ -120,7 +120,7 @@ class Mppi:
 def _plan(world: World, model: RolloutModel, rollouts: Rollouts, s: int) -> Plan:
     """The plan of one rollout."""
     end = int(rollouts.ends[s])
-    parts = model.problem.substeps
+    parts = model.substeps
     poses: FloatArray = rollouts.paths[s, : end + 1]
     twists = np.repeat(rollouts.twists[s], parts, axis=0)
     twists = np.concatenate([twists, twists[-1:]])[: end + 1]

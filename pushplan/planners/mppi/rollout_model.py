@@ -6,25 +6,18 @@ import math
 
 import numpy as np
 
-from pushplan.compiled import owned
 from pushplan.control.limits import driven_twist
+from pushplan.core import motion
+from pushplan.core import planners as core
 from pushplan.interaction import InteractionModel, QuasiStatic, SweepsMany
-from pushplan.interaction.advance import CompiledInteraction
+from pushplan.interaction.compiled_model import CompiledInteraction
 from pushplan.interaction.ice_interaction import IceInteraction
-from pushplan.motion.collision import footprint, is_free, obstacles, static_depth
+from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.goal_region import goal_numbers
 from pushplan.motion.keep_out import keep_out
 from pushplan.planners.mppi.control_sequence import interpolation
 from pushplan.planners.mppi.mppi_config import MppiConfig
-from pushplan.planners.mppi.rollout_kernels import (
-    BLOCKED,
-    DriveLimits,
-    RolloutProblem,
-    Rollouts,
-    make_rollouts,
-    roll_objects,
-    roll_robots,
-)
+from pushplan.planners.mppi.rollouts import BLOCKED, Rollouts, make_rollouts
 from pushplan.world import GoalDisc, GoalLine, World
 from pushplan.world.checks import FloatArray
 
@@ -59,7 +52,7 @@ class RolloutModel:
         world: the snapshot.
         config: settings.
         interaction: predicts the objects; `default_model` if None. One in compiled form rolls
-            all samples in one kernel; any other one is asked for each sample's path.
+            all samples in the core; any other one is asked for each sample's path.
     """
 
     def __init__(
@@ -73,10 +66,11 @@ class RolloutModel:
         if isinstance(self.interaction, CompiledInteraction) and len(self.world.movables):
             self.compiled = self.interaction.compiled(self.world)
         self._matrix = interpolation(config.steps, config.knots)
-        self._objects = owned(self.world.movables.poses)
+        self._objects = self.world.movables.poses
         driven = driven_twist(world)
-        self._twist = np.array([driven.linear, driven.angular])
-        self.problem = _problem(world, config, self.period)
+        self._twist = (driven.linear, driven.angular)
+        self.substeps = _substeps(world, self.period)
+        self._problem = _problem(world, config, self.period, self.substeps)
 
     @property
     def horizon(self) -> float:
@@ -91,13 +85,11 @@ class RolloutModel:
         """
         controls = np.ascontiguousarray(np.einsum("hm,smc->shc", self._matrix, knots))
         config = self.config
-        rollouts = make_rollouts(
-            len(knots), config.steps, self.problem.substeps, len(self._objects)
-        )
-        start = owned(self.world.robot_pose)
-        roll_robots(controls, start, self._twist, self.problem, rollouts)
+        rollouts = make_rollouts(len(knots), config.steps, self.substeps, len(self._objects))
+        memory = core.Rollouts(*rollouts)
+        core.roll_robots(controls, self.world.robot_pose, *self._twist, self._problem, memory)
         if self.compiled is not None:
-            roll_objects(self.compiled, self._objects, rollouts)
+            core.roll_objects(self.compiled, self._objects, memory)
         elif len(self._objects):
             self._ask(rollouts)
         # a path stays where it has ended, so that costs need not know the ends
@@ -148,36 +140,43 @@ def _nearby(world: World, horizon: float) -> World:
     )
 
 
-def _problem(world: World, config: MppiConfig, period: float) -> RolloutProblem:
+def _substeps(world: World, period: float) -> int:
+    """Poses in a step of a rollout."""
     robot = world.robot
-    limits = DriveLimits(
-        robot.min_speed,
-        robot.max_speed,
-        robot.max_turn_rate,
-        robot.max_acceleration * period,
-        robot.max_turn_acceleration * period,
-        robot.min_turning_radius,
-    )
-    walls = obstacles(keep_out(world))
-    start = owned(world.robot_pose)
     turn = robot.max_turn_rate * period
     length = max(robot.max_speed, -robot.min_speed) * period / robot.circumscribed_radius
+    return max(1, math.ceil(max(turn / _TURN, length / _LENGTH) - 1e-9))
+
+
+def _problem(world: World, config: MppiConfig, period: float, substeps: int) -> core.RolloutProblem:
+    robot = world.robot
+    limits = np.array(
+        [
+            robot.min_speed,
+            robot.max_speed,
+            robot.max_turn_rate,
+            robot.max_acceleration * period,
+            robot.max_turn_acceleration * period,
+            robot.min_turning_radius,
+        ]
+    )
+    walls = obstacles(keep_out(world))
     for margin in (config.margin * robot.circumscribed_radius, 0.0):
         shape = footprint(robot, margin)
-        corners = np.empty_like(shape.vertices)
-        if is_free(start, shape, walls, corners):
+        checker = motion.CollisionChecker(shape, walls)
+        if checker.is_free(world.robot_pose):
             break
     has_goal = isinstance(world.goal, GoalDisc | GoalLine)
     goal = np.zeros(5)  # not read where the robot has none
     if has_goal:
         goal = goal_numbers(world.navigation_goal, 0.0)
-    return RolloutProblem(
-        float(period),
-        max(1, math.ceil(max(turn / _TURN, length / _LENGTH) - 1e-9)),
+    return core.RolloutProblem(
+        period,
+        substeps,
         limits,
         shape,
         walls,
         goal,
         has_goal,
-        float(static_depth(start, shape, walls, corners)),
+        allowed=checker.depth(world.robot_pose),
     )

@@ -1,176 +1,119 @@
 """Least driven length to the goal from every pose, around walls and under the turn limit.
 
-The value function of a forward car of bounded curvature on a grid of (x, y, heading), solved by
-semi-Lagrangian Gauss-Seidel sweeps: from each cell centre short arcs are driven, and the value
-where they end is interpolated (Falcone and Ferretti, "Semi-Lagrangian Approximation Schemes for
-Linear and Hamilton-Jacobi Equations", 2013; for cars: Takei, Tsai, Shen and Landa, "A practical
-path-planning algorithm for a simple car", 2010). Objects are not in it, so one table serves every
-call on a map.
+The core's `CostToGo` is the value function of a forward car of bounded curvature on a grid of
+(x, y, heading). Objects are not in it, so one table serves every call on a map; it is made and kept
+a little at a time.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import functools
+import threading
+from collections.abc import Callable
 
 import numpy as np
 
-from pushplan.compiled import kernel
-from pushplan.motion.collision import ConvexObstacles, Footprint, is_free
-from pushplan.motion.goal_region import in_goal
-from pushplan.search.grid_dijkstra import new_grid_search, settle_cells
-from pushplan.world.checks import BoolArray, FloatArray, IntArray
+from pushplan.core import motion
+from pushplan.core import planners as core
+from pushplan.motion.collision import footprint, obstacles
+from pushplan.motion.goal_region import goal_numbers
+from pushplan.world import GoalDisc, NavigationGoal, RobotModel, StaticMap
+
+HEADINGS = 32
+"""Headings of the grid."""
+_CELL = 0.33  # side of a cell [R]
+_COARSEST = 0.8  # side of a cell beyond which a table would not resolve the robot [R]
+_MOST_CELLS = 16_000  # cells (x, y) at most; larger maps get larger cells
+_ARC = 2.0  # length of the arcs that carry values from cell to cell [cells]
+_SETTLED = 0.02  # change of a value below which the table is done [R]
+_MOST_SWEEPS = 60
+_BLOCK = 60  # cells (x, y) that are worked on between two looks at the stop rule: under 2 ms
 
 
-class CostToGo(NamedTuple):
-    """A table of lengths to the goal."""
+class CostToGoMaker:
+    """Makes one table in small steps, so that a planning call can stop in between.
 
-    values: FloatArray
-    """(rows, columns, headings) [m]; inf where the robot overlaps a wall or has no way"""
-    floor: FloatArray
-    """(rows, columns) [m] least length for the robot's inscribed disc, on the grid"""
-    origin: FloatArray  # (2,) least x, y of the grid [m]
-    cell: float  # Side of a cell [m]
+    What is done is kept for the next call. Thread-safe.
+    """
 
+    def __init__(
+        self,
+        robot: RobotModel,  # gives footprint and size
+        static: StaticMap,  # the map
+        goal: NavigationGoal,
+        radius: float,  # least turning radius [m]
+        inset: float,  # depth in the goal at which paths end [m]
+    ) -> None:
+        size = robot.circumscribed_radius
+        self._goal = goal_numbers(goal, inset)
+        self._shape = footprint(robot)
+        self._walls = obstacles(static)
+        extent = static.bounds[2:] - static.bounds[:2]
+        least = float(np.sqrt(extent[0] * extent[1] / _MOST_CELLS))
+        cell = max(_CELL * size, least, float(extent.max()) / _MOST_CELLS)
+        self.useful = cell <= _COARSEST * size
+        """True if a table of bearable size resolves the robot."""
+        cols, rows = (max(1, int(np.ceil(side / cell))) if self.useful else 1 for side in extent)
+        self._length = _ARC * cell
+        self._center = -1
+        if isinstance(goal, GoalDisc):
+            at = (goal.center - static.bounds[:2]) / cell
+            if (at >= 0.0).all() and at[0] < cols and at[1] < rows:
+                self._center = int(at[1]) * cols + int(at[0])
+        self._free = np.zeros((rows, cols, HEADINGS), np.bool_)
+        self._order = np.zeros(0, np.int64)
+        self._values = np.full((rows, cols, HEADINGS), np.inf)
+        self._floor = np.full((rows, cols), np.inf)
+        x, y = static.bounds[:2].tolist()
+        self._place: tuple[float, float, float] = (x, y, cell)
+        self._table = core.CostToGo(self._values, self._floor, *self._place)
+        self._ends = np.zeros((HEADINGS, 3, 3))
+        for k in range(HEADINGS):
+            for arc, side in enumerate((-1.0, 0.0, 1.0)):
+                start = np.array([0.0, 0.0, 2.0 * np.pi * k / HEADINGS])
+                motion.along_arc(start, self._length, side / radius, self._ends[k, arc])
+        self._marked = self._at = self._sweeps = 0
+        self._change = 0.0
+        self._settled = _SETTLED * size
+        self._lock = threading.Lock()
+        self._done = not self.useful
 
-@kernel(allocates=True)
-def mark_free(
-    table: CostToGo,
-    free: BoolArray,  # (rows, columns, headings), changed in place
-    first: int,  # cells, counted row by row
-    last: int,
-    shape: Footprint,
-    walls: ConvexObstacles,
-) -> None:
-    """Mark which of the cells from ``first`` to ``last`` (exclusive) hold the footprint."""
-    scratch = np.empty_like(shape.vertices)
-    pose = np.empty(3)
-    cols = free.shape[1]
-    headings = free.shape[2]
-    for at in range(first, last):
-        r = at // cols
-        c = at % cols
-        pose[0] = table.origin[0] + (c + 0.5) * table.cell
-        pose[1] = table.origin[1] + (r + 0.5) * table.cell
-        for k in range(headings):
-            pose[2] = 2.0 * np.pi * k / headings
-            free[r, c, k] = is_free(pose, shape, walls, scratch)
+    def make(self, stopped: Callable[[], bool]) -> core.CostToGo | None:
+        """Work until the table is done; None if the stop rule fires before, or it is of no use."""
+        while not self._done:
+            if stopped():
+                return None
+            with self._lock:
+                if not self._done:
+                    self._step()
+        return self._table if self.useful else None
 
-
-@kernel(allocates=True)
-def flood(
-    table: CostToGo,
-    open_cells: BoolArray,  # (rows, columns)
-    goal: FloatArray,  # (5,) from `goal_numbers`
-    center: IntArray,  # (2,) row and column of the goal's middle, negative for none
-) -> tuple[FloatArray, IntArray]:
-    """Grid lengths (rows, columns) [m] to the goal, and the cells in the order of their lengths."""
-    origin = table.origin
-    cell = table.cell
-    rows, cols = open_cells.shape
-    starts = np.empty(rows * cols + 1, np.int64)
-    count = 0
-    weights = np.full((rows, cols), np.inf)
-    for at in range(rows * cols):
-        r = at // cols
-        c = at % cols
-        if open_cells[r, c]:
-            weights[r, c] = 1.0
-        x = origin[0] + (c + 0.5) * cell
-        y = origin[1] + (r + 0.5) * cell
-        # a disc may be smaller than a cell
-        if (open_cells[r, c] and in_goal(x, y, goal)) or (r == center[0] and c == center[1]):
-            starts[count] = at
-            count += 1
-    none = np.zeros((rows, cols), np.bool_)
-    search = new_grid_search(rows, cols, starts[:count])
-    settle_cells(search, weights, none, cell, rows * cols)
-    return search.costs, search.order[: search.counters[1]]
-
-
-@kernel
-def _between(
-    values: FloatArray, ox: float, oy: float, cell: float, x: float, y: float, theta: float
-) -> float:
-    """Interpolated value at a pose; cells without a value do not count, inf if none has one."""
-    rows, cols, headings = values.shape
-    u = (x - ox) / cell - 0.5
-    v = (y - oy) / cell - 0.5
-    t = (theta / (2.0 * np.pi) * headings) % headings
-    j = int(np.floor(u))
-    i = int(np.floor(v))
-    k = int(t)
-    fu = u - j
-    fv = v - i
-    ft = t - k
-    k = k % headings
-    total = 0.0
-    weight = 0.0
-    for di in range(2):
-        r = i + di
-        if r < 0 or r >= rows:
-            continue
-        wi = fv if di == 1 else 1.0 - fv
-        for dj in range(2):
-            c = j + dj
-            if c < 0 or c >= cols:
-                continue
-            wj = wi * (fu if dj == 1 else 1.0 - fu)
-            for dk in range(2):
-                w = wj * (ft if dk == 1 else 1.0 - ft)
-                value = values[r, c, (k + dk) % headings]
-                if w > 1e-9 and value < np.inf:
-                    total += w * value
-                    weight += w
-    return total / weight if weight > 0.25 else np.inf
+    def _step(self) -> None:
+        rows, cols, _ = self._free.shape
+        if self._marked < rows * cols:
+            last = min(self._marked + _BLOCK, rows * cols)
+            core.mark_free(self._free, self._marked, last, *self._place, self._shape, self._walls)
+            self._marked = last
+            if last == rows * cols:
+                some = np.asarray(self._free.any(axis=2))
+                self._order = core.flood(some, *self._place, self._goal, self._center, self._floor)
+                self._values[(self._floor == 0.0)[:, :, None] & self._free] = 0.0
+            return
+        last = min(self._at + _BLOCK, len(self._order))
+        order = self._order[self._at : last]
+        change = self._table.sweep(self._values, self._free, order, self._ends, self._length)
+        self._change = max(self._change, change)
+        self._at = last
+        if last == len(self._order):
+            self._sweeps += 1
+            self._done = self._change < self._settled or self._sweeps >= _MOST_SWEEPS
+            self._at = 0
+            self._change = 0.0
 
 
-@kernel
-def sweep(
-    table: CostToGo,  # its values are changed in place
-    free: BoolArray,  # (rows, columns, headings)
-    order: IntArray,  # (N,) cells by their distance from the goal
-    ends: FloatArray,  # (headings, arcs, 3) displacement at the end of each arc
-    length: float,  # of the arcs [m]
-) -> float:
-    """One Gauss-Seidel sweep over the cells; returns the greatest change [m]."""
-    values = table.values
-    cell = table.cell
-    cols = values.shape[1]
-    headings = values.shape[2]
-    change = 0.0
-    ox = table.origin[0]
-    oy = table.origin[1]
-    for n in range(order.shape[0]):
-        r = order[n] // cols
-        c = order[n] % cols
-        x = ox + (c + 0.5) * cell
-        y = oy + (r + 0.5) * cell
-        if table.floor[r, c] == 0.0:
-            continue
-        for k in range(headings):
-            if not free[r, c, k]:
-                continue
-            best = values[r, c, k]
-            for a in range(ends.shape[1]):
-                nx = x + ends[k, a, 0]
-                ny = y + ends[k, a, 1]
-                nt = ends[k, a, 2]
-                value = length + _between(values, ox, oy, cell, nx, ny, nt)
-                if value < best:
-                    best = value
-            if best < values[r, c, k]:
-                change = max(change, min(values[r, c, k], 1e9) - best)
-                values[r, c, k] = best
-    return change
-
-
-@kernel
-def length_to_go(table: CostToGo, x: float, y: float, theta: float) -> float:
-    """Length to the goal [m] from a pose: the table's, or its floor where it has none."""
-    value = _between(table.values, table.origin[0], table.origin[1], table.cell, x, y, theta)
-    rows, cols = table.floor.shape
-    r = min(max(int((y - table.origin[1]) / table.cell), 0), rows - 1)
-    c = min(max(int((x - table.origin[0]) / table.cell), 0), cols - 1)
-    if value == np.inf:
-        value = table.floor[r, c]
-    return value
+@functools.lru_cache(maxsize=8)
+def cost_to_go_maker(
+    robot: RobotModel, static: StaticMap, goal: NavigationGoal, radius: float, inset: float
+) -> CostToGoMaker:
+    """The maker of a table, with what is done of it; cached."""
+    return CostToGoMaker(robot, static, goal, radius, inset)

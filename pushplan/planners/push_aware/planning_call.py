@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pushplan.compiled import owned
+from pushplan.core import planners as core
+from pushplan.core import search
 from pushplan.motion.dubins_warm_start import warm_start
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.length_bound import length_bound
@@ -14,13 +15,8 @@ from pushplan.motion.path_improver import Candidate, PathImprover
 from pushplan.motion.path_search_config import INSET, LEAST_GAIN
 from pushplan.motion.random_tree.tree_paths import TreePaths
 from pushplan.motion.start_turn import start_turn
-from pushplan.planners.push_aware.best_first import Branching, make_search
-from pushplan.planners.push_aware.cost_to_go import CostToGo, length_to_go
-from pushplan.planners.push_aware.cost_to_go_maker import cost_to_go_maker
+from pushplan.planners.push_aware.cost_to_go import cost_to_go_maker
 from pushplan.planners.push_aware.push_aware_config import PushAwareConfig
-from pushplan.planners.push_aware.push_tree import PushTree, make_push_tree, plant, trace
-from pushplan.planners.push_aware.random_tree import DRAWS, grow
-from pushplan.search.astar import EXHAUSTED, FOUND
 from pushplan.world import PlanStatus
 from pushplan.world.checks import FloatArray
 
@@ -45,6 +41,7 @@ _MOST_RATIO = 2.0  # the same at most: more inflation would make searches greedy
 _RANDOM_NODES = 20_000  # nodes of a random tree at most; then another is begun
 _SIGNATURES = 4  # ways to have pushed the objects that some searches tell apart in each cell
 _LONGEST_ARC = 2.0  # longest arc of the random tree [R]
+_DRAWS = 6  # random numbers that one arc of the random tree takes
 _LARGE_TURN = 0.5  # turn on the spot from which on arcs without it are a detour [rad]
 
 
@@ -76,10 +73,11 @@ class PushAwareSearch:
         self.expansions = self.searches = self.random_arcs = 0
         self.bound = 0.0
         """Lower bound on the cost of every plan [kg m]."""
-        self._radius = improver.problem.turning_radius
+        self._radius = improver.turning_radius
         self._patience = _FIRST_SEARCH
-        self._nodes: PushTree | None = None
-        self._tree: PushTree | None = None
+        self._nodes: core.PushTree | None = None
+        self._cells = (0, 0, 0, 0)
+        self._tree: core.PushTree | None = None
 
     def run(self) -> PlanStatus | None:
         """Search until the stop rule fires; None where there is no plan by then."""
@@ -136,7 +134,7 @@ class PushAwareSearch:
                 self._search(table, replace(self._first_variant(table), inflation=_UNSOLVED_RATIO))
         return None
 
-    def _turn_first(self, table: CostToGo | None) -> None:
+    def _turn_first(self, table: core.CostToGo | None) -> None:
         """Try paths that begin with a turn on the spot, and go on with them if they cost less."""
         improver = self.improver
         if improver.stopped():
@@ -153,7 +151,7 @@ class PushAwareSearch:
         if not improver.best_cost < before:
             improver.begin_with(None)
 
-    def _table(self) -> CostToGo | None:
+    def _table(self) -> core.CostToGo | None:
         """Lengths to the goal without objects; the same for every call on this map."""
         robot = self.world.robot
         static = keep_out(self.world)
@@ -161,12 +159,11 @@ class PushAwareSearch:
         maker = cost_to_go_maker(robot, static, self.improver.goal, self._radius, inset)
         return maker.make(self.improver.stopped)
 
-    def _first_variant(self, table: CostToGo) -> _SearchVariant:
+    def _first_variant(self, table: core.CostToGo) -> _SearchVariant:
         inflation = max(self.config.heuristic_inflation, 0.5 * (1.0 + self._cost_ratio(table)))
-        masses = owned(self.world.movables.masses)
-        return _SearchVariant(_ARC, _CURVATURES, inflation, 1, masses)
+        return _SearchVariant(_ARC, _CURVATURES, inflation, 1, self.world.movables.masses)
 
-    def _random_variant(self, table: CostToGo) -> _SearchVariant:
+    def _random_variant(self, table: core.CostToGo) -> _SearchVariant:
         """Other edges, another inflation and other costs: what one search misses another finds."""
         config = self.config
         rng = self.rng
@@ -180,56 +177,60 @@ class PushAwareSearch:
             masses=masses * np.exp(_COST_SIGMA * rng.standard_normal(len(masses))),
         )
 
-    def _cost_ratio(self, table: CostToGo) -> float:
+    def _cost_ratio(self, table: core.CostToGo) -> float:
         """Return the cost of the best plan over that of its path without objects, at most 2.
 
         Among many objects the rest of a path costs so much more than its length, too, and a
         search that knows wastes no time on what only looks cheap.
         """
         x, y, theta = (float(value) for value in self.world.robot_pose)
-        alone = self.world.robot.mass * float(length_to_go(table, x, y, theta))
+        alone = self.world.robot.mass * table.length_to_go(x, y, theta)
         if not self.improver.solved or not 0.0 < alone < np.inf:
             return _UNSOLVED_RATIO
         return min(max(self.improver.best_cost / alone, 1.0), _MOST_RATIO)
 
-    def _memory(self, table: CostToGo, signatures: int) -> PushTree:
+    def _memory(self, table: core.CostToGo, signatures: int) -> core.PushTree:
         """Memory for one search; kept for the next where it fits."""
-        rows, cols, headings = table.values.shape
-        cells = (rows, cols, headings, signatures)
+        cells = (*table.shape, signatures)
         if self._nodes is None:
-            self._nodes = make_push_tree(_NODES, len(self.world.movables), _MEMORY, cells)
-        if self._nodes.best.shape != cells:
-            self._nodes = self._nodes._replace(best=np.empty(cells))
+            self._nodes = core.PushTree(_NODES, len(self.world.movables), _MEMORY, *cells)
+        elif self._cells != cells:
+            self._nodes.set_cells(*cells)
+        self._cells = cells
         return self._nodes
 
-    def _search(self, table: CostToGo, variant: _SearchVariant) -> None:
+    def _search(self, table: core.CostToGo, variant: _SearchVariant) -> None:
         """One best-first search under the best cost so far, and shortcutting of what it finds."""
         improver = self.improver
         nodes = self._memory(table, variant.signatures)
-        branching = Branching(
-            np.linspace(-1.0, 1.0, variant.curvatures) / improver.problem.turning_radius,
-            variant.arc * table.cell,
-            variant.inflation,
-            self.config.pruning_factor,
-            variant.masses,
-        )
         self._plant(nodes)
         self.searches += 1
-        bound = (1.0 + _SLACK) * improver.plan_cost
-        star = make_search(nodes, table, branching, bound, improver.problem)
+        star = core.push_search(
+            nodes,
+            table,
+            curvatures=np.linspace(-1.0, 1.0, variant.curvatures) / improver.turning_radius,
+            length=variant.arc * table.cell,
+            inflation=variant.inflation,
+            pruning_factor=self.config.pruning_factor,
+            masses=variant.masses,
+            bound=(1.0 + _SLACK) * improver.plan_cost,
+            problem=improver.problem,
+            model=improver.contacts,
+            size=2 * _NODES,
+        )
         while not improver.stopped():
-            before = int(nodes.counts[3])
+            before = nodes.driven
             if before >= self._patience:
                 self._patience *= _PATIENCE_GROWTH  # the trees may know better meanwhile
                 return
             outcome = star.run(2 * self._batch())
-            driven = int(nodes.counts[3]) - before
+            driven = nodes.driven - before
             improver.iterations += max(1, driven)
             self.expansions += driven
-            if outcome == FOUND:
-                self._try(trace(nodes, star.goal // 2))
+            if outcome == search.SearchStatus.FOUND:
+                self._try(nodes.arcs_to(star.goal))
                 return
-            if outcome == EXHAUSTED or nodes.counts[2]:
+            if outcome == search.SearchStatus.EXHAUSTED or nodes.full:
                 return
 
     def _grow_at_random(self, arcs: float) -> None:
@@ -238,7 +239,7 @@ class PushAwareSearch:
         world = self.world
         batch = self._batch()
         if self._tree is None:
-            self._tree = make_push_tree(_RANDOM_NODES, len(world.movables), _MEMORY)
+            self._tree = core.PushTree(_RANDOM_NODES, len(world.movables), _MEMORY)
             self._plant(self._tree)
         scales = np.array([2.0 * self.size, np.pi, 2.0 * self.size * world.robot.mass])
         last = improver.iterations + arcs
@@ -246,19 +247,21 @@ class PushAwareSearch:
             bound = improver.plan_cost
             if not np.isfinite(bound):
                 return
-            draws = self.rng.random((batch, DRAWS))
+            draws = self.rng.random((batch, _DRAWS))
             longest = _LONGEST_ARC * self.size
-            node = grow(self._tree, draws, bound, longest, scales, improver.problem)
+            node = core.grow(
+                self._tree, draws, bound, longest, scales, improver.problem, improver.contacts
+            )
             improver.iterations += batch
             self.random_arcs += batch
             if node >= 0:
-                self._try(trace(self._tree, node))
+                self._try(self._tree.arcs_to(node))
             if node == -2:
                 self._plant(self._tree)
 
-    def _plant(self, tree: PushTree) -> None:
+    def _plant(self, tree: core.PushTree) -> None:
         """Begin a search where the robot and the objects are."""
-        plant(tree, self.improver.lead.pose, self.improver.lead.objects, 0.0)
+        tree.plant(self.improver.lead.pose, self.improver.lead.objects, 0.0)
 
     def _batch(self) -> int:
         """Arcs to drive between two looks at the stop rule."""

@@ -5,7 +5,7 @@ a predictive one that keeps the box on the bumper. See docs/pushing.md.
 """
 
 from pushplan.planners.pushing.bumper import Bumper, Face, face_towards
-from pushplan.planners.pushing.mpc import PushingMpc, warm_up
+from pushplan.planners.pushing.mpc import PushingMpc
 from pushplan.planners.pushing.parameters import (
     PushingConfig,
     PushParameters,
@@ -29,5 +29,4 @@ __all__ = [
     "pressure_radius",
     "spread_of",
     "stable_curvature",
-    "warm_up",
 ]

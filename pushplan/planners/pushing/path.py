@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pushplan.motion.dubins import along_arc
+from pushplan.core import motion as core
 from pushplan.world import InvalidInputError, Plan, RobotModel, SubTask
 from pushplan.world.checks import ArrayRecord, FloatArray, array, expect, integer, number
 from pushplan.world.polyline import arc_lengths, step_lengths
@@ -60,7 +60,7 @@ class PushPath(ArrayRecord):
             count = min(max(_PIECES, math.ceil(turn / _GREATEST_TURN)), 2000)
             for _ in range(count):
                 out = np.empty(3)
-                along_arc(poses[-1], length / count, curvature, out)
+                core.along_arc(poses[-1], length / count, curvature, out)
                 poses.append(out)
         return cls(np.array(poses))
 

@@ -9,9 +9,8 @@ from typing import Annotated, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pushplan.planners.pushing import box_motion_kernels, contact_kernels
+from pushplan.core import pushing as core
 from pushplan.planners.pushing.bumper import Bumper, Face, face_towards
-from pushplan.planners.pushing.contact_kernels import Contact
 from pushplan.planners.pushing.parameters import (
     PushParameters,
     pressure_radius,
@@ -49,7 +48,7 @@ class PushState(ArrayRecord, CheckedFields):
     field_prefix: ClassVar[str] = "push state "
 
     def row(self) -> FloatArray:
-        """(6,) as the kernels read it."""
+        """(6,) as the core reads it."""
         return np.array([*self.robot_pose, self.offset, self.angle, max(self.gap, 0.0)])
 
     @classmethod
@@ -89,7 +88,7 @@ class PushModel:
         expect("parameters", self.parameters, PushParameters)
         self.face = face_towards(self.outline, 0.0) if face is None else face
         expect("face", self.face, Face)
-        self.contact = Contact(
+        self.contact = core.BoxContact(
             self.bumper.front,
             self.bumper.half,
             min(self.bumper.curvature, _MOST_HOLLOW / self.face.depth),
@@ -107,7 +106,7 @@ class PushModel:
 
     def stable_curvature(self, offset: float = 0.0) -> float:
         """`stable_curvature` of a box at an offset [m] on this bumper, as if straight [1/m]."""
-        low, high = contact_kernels.line(self.contact, number("offset", offset))
+        low, high = self.contact.line(number("offset", offset))
         return stable_curvature(
             self.parameters.friction,
             reach=self.bumper.front,
@@ -120,14 +119,11 @@ class PushModel:
         """The state of a robot and a box at poses (3,) x, y [m], theta [rad]."""
         robot: FloatArray = array("robot_pose", robot_pose, (3,))
         box: FloatArray = array("box_pose", box_pose, (3,))
-        row = np.empty(6)
-        box_motion_kernels.observe(self.contact, self.face.normal, robot, box, row)
-        return PushState.from_row(row)
+        return PushState.from_row(self.contact.observe(self.face.normal, robot, box))
 
     def box_pose(self, state: PushState) -> FloatArray:
         """(3,) pose of the box."""
-        pose = np.empty(3)
-        box_motion_kernels.box_pose(self.contact, state.row(), pose)
+        pose: FloatArray = self.contact.box_pose(state.row())
         pose[2] -= self.face.normal
         return pose
 
@@ -142,7 +138,10 @@ class PushModel:
             dt: how long each is held [s], one number or (N,).
 
         Returns:
-            States (N + 1, 6) as `PushState.row`, and (N, 6) details as `contact_velocity` has.
+            States (N + 1, 6) as `PushState.row`, and (N, 6) how the box moves at the end of each
+            command: speeds along and across the face's normal [m/s], turn rate [rad/s], centre of
+            pressure on the face [m], mode (free 0, sticks 1, slides 2; the same on a corner 3 and
+            4), and friction over normal force.
         """
         commands = array("twists", twists, (None, 2))
         count = len(commands)
@@ -154,6 +153,6 @@ class PushModel:
             raise InvalidInputError(f"dt must be positive, got {steps.min()}")
         row = expect("state", state, PushState).row()
         states = np.empty((count + 1, 6))
-        details = np.empty((count, 6))
-        box_motion_kernels.rollout(self.contact, row, commands, steps, states, details)
-        return states, details
+        motions = np.empty((count, 6))
+        self.contact.roll_out(row, commands, steps, states, motions)
+        return states, motions

@@ -5,26 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from pushplan.control import Legs
 from pushplan.control.leg_follower import turn_to
-from pushplan.interaction.kernels import sweep_path
+from pushplan.core import rearrangement as core
 from pushplan.planners.rearrangement.approach_lattice import ContactGrid
-from pushplan.planners.rearrangement.pose_grid_kernels import (
-    PoseGrid,
-    add_layers,
-    near_poses,
-)
-from pushplan.planners.rearrangement.pose_search_kernels import (
-    Arrivals,
-    PoseSearchProblem,
-    search_poses,
-)
 from pushplan.planners.rearrangement.push import Push
 from pushplan.planners.rearrangement.push_scene import PushScene
-from pushplan.planners.rearrangement.route_kernels import RouteProblem, cheapest_legs
 from pushplan.world.checks import FloatArray, IntArray
 
 _NO_POSES = np.zeros(0, dtype=np.int64)
@@ -93,17 +83,23 @@ def search_approaches(
     """
     grid, layers = contact_grid
     for reach in _START_REACHES:
-        starts, costs = near_poses(grid, np.array(pose), reach)
+        starts, costs = grid.near_poses(pose, reach)
         if len(starts):
             break
-    depths, touch = add_layers(layers, weights)
-    problem = PoseSearchProblem(
-        starts, costs, grid, depths, touch, scene.turn_cost, scene.arm, until
-    )
-    return ApproachTree(*search_poses(problem), target)
+    depths, touch = core.add_layers(layers, weights)
+    found = grid.search(starts, costs, depths, touch, scene.turn_cost, scene.arm, until)
+    return ApproachTree(*found, target)
 
 
-def arrivals_at(grid: PoseGrid, pushes: Sequence[Push]) -> Arrivals:
+class Arrivals(NamedTuple):
+    """Poses of the lattice from which some places are reached, one place after the other."""
+
+    nodes: IntArray
+    extra: FloatArray  # Cost of the rest of the path [m]
+    ends: IntArray  # (N,) where the poses of each place end
+
+
+def arrivals_at(grid: core.PoseGrid, pushes: Sequence[Push]) -> Arrivals:
     """The poses from which the starts of pushes are reached."""
     found = [arrival_poses(grid, push.start) for push in pushes]
     return Arrivals(
@@ -113,12 +109,12 @@ def arrivals_at(grid: PoseGrid, pushes: Sequence[Push]) -> Arrivals:
     )
 
 
-def arrival_poses(grid: PoseGrid, start: FloatArray) -> tuple[IntArray, FloatArray]:
+def arrival_poses(grid: core.PoseGrid, start: FloatArray) -> tuple[IntArray, FloatArray]:
     """Lattice poses from which the start of a push is reached, and the cost of the rest [m]."""
     u = np.array([np.cos(start[2]), np.sin(start[2]), 0.0])
-    nodes, extra = near_poses(grid, start - _ARRIVAL_BACK * grid.step * u, _ARRIVAL_REACHES[0])
+    nodes, extra = grid.near_poses(start - _ARRIVAL_BACK * grid.step * u, _ARRIVAL_REACHES[0])
     if not len(nodes):
-        nodes, extra = near_poses(grid, start, _ARRIVAL_REACHES[1])
+        nodes, extra = grid.near_poses(start, _ARRIVAL_REACHES[1])
     return nodes, extra
 
 
@@ -147,7 +143,6 @@ def find_route(
             none.
     """
     grid = scene.fine.grid
-    problem = scene.route_problem
     config = scene.config
     nodes, extra = arrival_poses(grid, start)
     if not len(nodes):
@@ -168,19 +163,20 @@ def find_route(
     ahead = scene.size * np.array([math.cos(here[2]), math.sin(here[2])])
     near = [here[:2], *(here[:2] + fraction * ahead for fraction in _FIRST_LEGS)]
     expected = math.inf
+    weights = scene.contact_weights
     if target >= 0:
-        weights = problem.weights.copy()
+        weights = weights.copy()
         if approach.target == target:
             weights[target] += config.around_cost
             expected = _MOST_DETOUR * float(total[best]) + scene.size
         else:
             weights[target] += config.target_cost
-        problem = problem._replace(weights=weights)
+    search = scene.route_search(weights)
     cheapest: Route | None = None
     for last in ([start[:2]], []):  # it may be too near to a wall to turn there
         for points, longest in ((corners, len(corners) + 1), (every, _LONGEST_LEG), (every, 1)):
             through = np.array([*near, *points, *last])
-            found = _cheapest(through, float(here[2]), end, len(near), longest, problem)
+            found = _cheapest(search, through, float(here[2]), end, len(near), longest)
             if found is None or (cheapest is not None and found.cost >= cheapest.cost):
                 continue
             cheapest = found
@@ -209,20 +205,20 @@ def simulate_route(scene: PushScene, route: Route) -> tuple[FloatArray, FloatArr
     path = poses_along(scene, route)
     poses = scene.poses.copy()
     out = np.empty((len(path), len(poses), 3))
-    jammed = sweep_path(path, poses, scene.bodies, scene.settings, out)
+    jammed = scene.contacts().sweep(path, poses, out)
     return None if jammed >= 0 else (path, out)
 
 
 def _cheapest(
+    search: core.RouteSearch,
     points: FloatArray,
     heading: float,
     end: float,
     first: int,
     longest: int,
-    problem: RouteProblem,
 ) -> Route | None:
-    """`cheapest_legs` as a route; arguments as there."""
-    costs, came, turns = cheapest_legs(points, heading, end, first, longest, problem)
+    """`RouteSearch.cheapest_legs` as a route; arguments as there."""
+    costs, came, turns = search.cheapest_legs(points, heading, end, first, longest)
     cost = float(costs.min())
     if math.isinf(cost):
         return None

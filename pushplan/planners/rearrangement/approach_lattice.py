@@ -6,19 +6,13 @@ import functools
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pushplan.interaction.kernels import Bodies
+from pushplan.core import interaction
+from pushplan.core import rearrangement as core
 from pushplan.motion.collision import footprint, obstacles
-from pushplan.planners.rearrangement.pose_grid_kernels import (
-    HEADINGS,
-    Layers,
-    PoseGrid,
-    block_moves,
-    block_poses,
-    contact_depths,
-)
 from pushplan.world import RobotModel, StaticMap
-from pushplan.world.checks import FloatArray, frozen
+from pushplan.world.checks import FloatArray
 
 _LEAST_CELL = 0.012
 """Side of a cell that is not too small for the map, as a fraction of its longer side."""
@@ -27,8 +21,8 @@ _LEAST_CELL = 0.012
 class ContactGrid(NamedTuple):
     """A lattice with the objects on it."""
 
-    grid: PoseGrid
-    layers: Layers
+    grid: core.PoseGrid
+    layers: NDArray[np.float32]  # (K, 16, rows, columns) depth of the footprint in each object [m]
 
 
 def contact_grid(
@@ -37,7 +31,7 @@ def contact_grid(
     cell: float,
     margin: float,
     poses: FloatArray,
-    bodies: Bodies,
+    bodies: interaction.Bodies,
     part: float = 1.0,
 ) -> ContactGrid:
     """The lattice for a robot among what is static and objects.
@@ -56,11 +50,13 @@ def contact_grid(
     sides = static.bounds[2:] - static.bounds[:2]
     side = max(cell, _LEAST_CELL * float(sides.max()) / size) * size
     grid = make_pose_grid(robot, static, part * side, away)
-    return ContactGrid(grid, contact_depths(grid, footprint(robot, away), poses, bodies))
+    return ContactGrid(grid, grid.contact_depths(footprint(robot, away), poses, bodies))
 
 
 @functools.lru_cache(maxsize=8)
-def make_pose_grid(robot: RobotModel, static: StaticMap, step: float, margin: float) -> PoseGrid:
+def make_pose_grid(
+    robot: RobotModel, static: StaticMap, step: float, margin: float
+) -> core.PoseGrid:
     """The lattice for a robot among what is static; kept for the maps used last.
 
     Args:
@@ -72,15 +68,12 @@ def make_pose_grid(robot: RobotModel, static: StaticMap, step: float, margin: fl
     x0, y0, x1, y1 = static.bounds.tolist()
     cols = int((x1 - x0) / step) + 1
     rows = int((y1 - y0) / step) + 1
-    grid = PoseGrid(
+    return core.PoseGrid(
         x0 + 0.5 * ((x1 - x0) - (cols - 1) * step),
         y0 + 0.5 * ((y1 - y0) - (rows - 1) * step),
         step,
-        np.empty((len(HEADINGS), rows, cols), dtype=np.bool_),
-        np.zeros((2, len(HEADINGS), rows, cols), dtype=np.bool_),
+        rows,
+        cols,
+        footprint(robot, margin),
+        obstacles(static),
     )
-    shape = footprint(robot, margin)
-    among = obstacles(static)
-    block_poses(grid, shape, among)
-    block_moves(grid, shape, among)
-    return grid._replace(blocked=frozen(grid.blocked), blocked_moves=frozen(grid.blocked_moves))

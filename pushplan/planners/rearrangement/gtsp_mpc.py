@@ -23,8 +23,6 @@ from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.planners.rearrangement.rearrangement_policy import (
     RearrangementPolicy,
-    warm_up_rearrangement,
-    warm_up_steering,
 )
 from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.world import InvalidInputError, Plan, PlanningExecutor, Stop, Twist, World
@@ -110,12 +108,6 @@ class GtspMpc(RearrangementPolicy):
     def expect_noise(self, position: float, heading: float) -> None:
         """See `pushplan.world.ExpectsNoise`."""
         self.config = replace(self.config, position_noise=position, heading_noise=heading)
-
-    def warm_up(self) -> None:
-        """Load the kernels that an episode may need."""
-        warm_up_rearrangement()
-        warm_up_steering()
-        super().warm_up()
 
     def _act(self, world: World) -> Twist:
         scene = self._observe(world)

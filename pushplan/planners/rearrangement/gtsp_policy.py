@@ -12,10 +12,7 @@ from pushplan.gtsp import solve_gtsp
 from pushplan.motion.keep_out import keep_out
 from pushplan.planners.rearrangement.candidates import open_edges
 from pushplan.planners.rearrangement.push_scene import PushScene
-from pushplan.planners.rearrangement.rearrangement_policy import (
-    RearrangementPolicy,
-    warm_up_rearrangement,
-)
+from pushplan.planners.rearrangement.rearrangement_policy import RearrangementPolicy
 from pushplan.world import ClearanceArea, MaxIterations, Receptacle, Twist, World
 from pushplan.world.checks import FloatArray
 
@@ -35,11 +32,6 @@ class Gtsp(RearrangementPolicy):
     def _forget(self) -> None:
         super()._forget()
         self._route_follower: LegFollower | None = None
-
-    def warm_up(self) -> None:
-        """Load the kernels that an episode may need."""
-        warm_up_rearrangement()
-        super().warm_up()
 
     def _act(self, world: World) -> Twist:
         if self._route_follower is None:

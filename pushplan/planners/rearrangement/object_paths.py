@@ -13,16 +13,25 @@ from scipy.ndimage import distance_transform_edt, map_coordinates
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
+from pushplan.core import rearrangement as core
 from pushplan.geometry import GoalDistances, goal_distances
 from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.done_places import done_places
-from pushplan.planners.rearrangement.goal_kernels import REMOVED
-from pushplan.planners.rearrangement.pose_grid_kernels import LENGTHS, MOVES
-from pushplan.planners.rearrangement.push_pose_kernels import pushable_moves
 from pushplan.planners.rearrangement.rearrangement_config import SHIFTS
 from pushplan.world import ClearanceArea, Goal, Receptacle, RobotModel, StaticMap
-from pushplan.world.checks import BoolArray, FloatArray
+from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
+_QUARTER = ((1, 0), (2, 1), (1, 1), (1, 2))
+MOVES: IntArray = np.array(
+    [*_QUARTER]
+    + [(-y, x) for x, y in _QUARTER]
+    + [(-x, -y) for x, y in _QUARTER]
+    + [(y, -x) for x, y in _QUARTER],
+    dtype=np.int64,
+)
+"""(16, 2) cells along x and y that a straight move along each heading crosses, as in the core."""
+LENGTHS: FloatArray = np.hypot(MOVES[:, 0], MOVES[:, 1])
+"""(16,) length of the move along each heading [cells]."""
 _INSET = 1.05  # distance of an object from the edges of a receptacle when it is done [radii]
 _MOST_KEPT = 20_000  # greatest number of lengths and paths that are kept
 _CELL = 0.125  # side of a cell [circumscribed radii of the robot]
@@ -66,7 +75,7 @@ class ObjectPaths:
     def remaining(self, poses: FloatArray) -> FloatArray:
         """(K,) length of the shortest path from poses (K, 3) to the goal [m]; 0 once removed."""
         return np.array(
-            [0.0 if x >= 0.5 * REMOVED else self.length(x, y) for x, y, _ in poses.tolist()]
+            [0.0 if x >= 0.5 * core.REMOVED else self.length(x, y) for x, y, _ in poses.tolist()]
         )
 
 
@@ -156,7 +165,7 @@ class PushCostToGo:
         if not walls.is_empty:
             shapely.prepare(walls)
             open_cells = shapely.distance(walls, middles) > 0.5 * radius
-        pushable = pushable_moves(
+        pushable = core.pushable_moves(
             np.stack(np.meshgrid(x, y), axis=2),
             open_cells,
             np.array(SHIFTS) * half_width,

@@ -10,8 +10,8 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from pushplan.control import Legs
+from pushplan.core import rearrangement as core
 from pushplan.geometry.angles import wrap_angle
-from pushplan.planners.rearrangement.goal_kernels import REMOVED
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.world import Plan, SubTask, World
 from pushplan.world.checks import ArrayRecord, FloatArray
@@ -172,7 +172,7 @@ def push_plan(world: World, route: Legs | None, push: Push) -> Plan:
     done = np.maximum(along - along[first], 0.0) / max(float(along[-1] - along[first]), 1e-12)
     start = world.movables.poses
     ends = np.array(push.object_poses)
-    gone = ends[:, 0] >= 0.5 * REMOVED
+    gone = ends[:, 0] >= 0.5 * core.REMOVED
     ahead = np.max(robot.vertices[:, 0]) + _BOX_INSCRIBED * world.movables.radii[gone]
     x, y, theta = poses[-1]
     ends[gone, 0] = x + ahead * np.cos(theta)

@@ -11,6 +11,7 @@ from functools import partial
 
 import numpy as np
 
+from pushplan.core import rearrangement as core
 from pushplan.errors import InvalidInputError, short
 from pushplan.motion.recovery_path import recovery_path
 from pushplan.planners.rearrangement.approach import (
@@ -20,7 +21,6 @@ from pushplan.planners.rearrangement.approach import (
     find_route,
     simulate_route,
 )
-from pushplan.planners.rearrangement.goal_kernels import REMOVED
 from pushplan.planners.rearrangement.push import Push, PushCost, PushHistory
 from pushplan.planners.rearrangement.push_graph import PushGraph, build_push_graph
 from pushplan.planners.rearrangement.push_order import sequence_pushes
@@ -166,7 +166,7 @@ def scene_after(scene: PushScene, push: Push) -> PushScene:
     """The scene that is expected at the end of a push."""
     world = scene.world
     after = push.object_poses
-    there = np.flatnonzero(after[:, 0] < 0.5 * REMOVED)
+    there = np.flatnonzero(after[:, 0] < 0.5 * core.REMOVED)
     movables = world.movables.select(there).moved_to(after[there])
     moved = replace(world, robot_pose=push.end, robot_twist=np.zeros(3), movables=movables)
     return PushScene(moved, scene.config, scene.cache)

@@ -9,12 +9,8 @@ import numpy as np
 
 from pushplan.control import EpisodeClock, PoseFollower, ProgressChecker, decrease_by
 from pushplan.control.limits import arc_twist
+from pushplan.core import rearrangement as core
 from pushplan.planners.pushing import PushingConfig, PushingMpc, PushParameters, PushPath
-from pushplan.planners.rearrangement.controller_kernels import (
-    PushingController,
-    is_on_bumper,
-    steer_push,
-)
 from pushplan.planners.rearrangement.push import Push
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.push_starts import initial_heading
@@ -50,7 +46,7 @@ class GeometricPusher:
         along: length of the path that the object has been pushed [m].
     """
 
-    def __init__(self, controller: PushingController, shift: float = 0.0) -> None:
+    def __init__(self, controller: core.PushingController, shift: float = 0.0) -> None:
         self._controller = controller
         self._shift = shift
         self._clock = EpisodeClock(1.0)
@@ -77,13 +73,12 @@ class GeometricPusher:
         step = self._controller.step
         turn = 0.0
         if len(found):
-            step, turn, self.along, _ = steer_push(
-                np.array(world.robot_pose),
-                np.array(world.movables.poses[found[0]]),
+            step, turn, self.along, _ = self._controller.steer_push(
+                world.robot_pose,
+                world.movables.poses[found[0]],
                 self._path,
                 self.along,
                 self._shift,
-                self._controller,
             )
         return arc_twist(world.robot, step, turn)
 
@@ -117,7 +112,7 @@ class PathPush:
         target = self._plan.subtasks[0].object_ids[0]
         remaining = self._plan.length - self._pusher.along
         for k in np.flatnonzero((world.movables.ids == target) & ~scene.done):
-            holds = is_on_bumper(np.array(world.robot_pose), scene.poses[k], scene.controller)
+            holds = scene.controller.is_on_bumper(world.robot_pose, scene.poses[k])
             if not (holds and self._progress.update(remaining, world.time)):
                 return None
         return twist
@@ -149,8 +144,7 @@ def make_pusher(scene: PushScene, push: Push, held: float, predictive: bool) -> 
         mpc = PushingMpc(PushingConfig(parameters=parameters, period=held))
         return PathPush(world.robot, push.target, path, mpc).command
     path = PushPath.through(push.object_path)
-    controller = scene.controller._replace(gain=push.gain)
-    pusher = GeometricPusher(controller, push.shift)
+    pusher = GeometricPusher(scene.controller.with_gain(push.gain), push.shift)
     return PathPush(world.robot, push.target, path, pusher).command
 
 

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pushplan.core import rearrangement as core
 from pushplan.planners.rearrangement.approach import (
     ApproachTree,
     approach_tree,
@@ -27,8 +28,6 @@ from pushplan.planners.rearrangement.approach import (
     search_approaches,
 )
 from pushplan.planners.rearrangement.candidates import delivering_pushes, partial_pushes
-from pushplan.planners.rearrangement.cost_to_go_kernels import MAX_OBJECTS
-from pushplan.planners.rearrangement.pose_search_kernels import least_costs
 from pushplan.planners.rearrangement.push import Push
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.relocation import relocating_pushes
@@ -137,7 +136,9 @@ class PushGraph:
     def objects(self) -> tuple[int, ...]:
         """Ids of the objects that it has a push for, in the order of the bits of `masks`."""
         reachable = [n for n in range(len(self.pushes)) if np.isfinite(self.costs[-1, n])]
-        return tuple(sorted({i for n in reachable for i in self.pushes[n].serves})[:MAX_OBJECTS])
+        return tuple(
+            sorted({i for n in reachable for i in self.pushes[n].serves})[: core.MAX_OBJECTS]
+        )
 
     @cached_property
     def masks(self) -> IntArray:
@@ -204,7 +205,7 @@ def build_push_graph(
         found = relocating_pushes(scene, k, approach, thorough)
         pushes += found
         relocations -= bool(found)
-    row = least_costs(approach.costs, arrivals_at(scene.fine.grid, pushes))
+    row = core.least_costs(approach.costs, *arrivals_at(scene.fine.grid, pushes))
     extra = np.array([penalty(push) for push in pushes])
     keep = _best(scene, pushes, row + extra)
     pushes = [pushes[n] for n in keep]
@@ -265,7 +266,7 @@ def _between(scene: PushScene, pushes: Sequence[Push]) -> FloatArray:
             weights = scene.config.later_fraction * scene.contact_weights
             weights[np.isin(ids, push.delivers)] = 0.0
             found = search_approaches(scene, scene.coarse, push.end, weights, arrivals.nodes)
-            known[key] = least_costs(found.costs, arrivals)
+            known[key] = core.least_costs(found.costs, *arrivals)
         out[n] = np.minimum(known[key], far)
     np.fill_diagonal(out, np.inf)
     return out

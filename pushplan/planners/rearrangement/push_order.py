@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from pushplan.core import rearrangement as core
 from pushplan.gtsp import solve_gtsp
-from pushplan.planners.rearrangement.cost_to_go_kernels import MAX_EXACT, cost_to_go
 from pushplan.planners.rearrangement.push_graph import PushGraph
 from pushplan.world import MaxIterations
 from pushplan.world.checks import FloatArray, IntArray
@@ -29,14 +29,14 @@ def _order_after(
 def push_order(graph: PushGraph, iterations: int = 300) -> tuple[list[int], float]:
     """The cheapest order of pushes that is found: their indices, and its cost [m].
 
-    Objects without a push are left out. Up to `MAX_EXACT` objects the order is the cheapest there
-    is; beyond, `solve_gtsp` searches for one on the reduced problem.
+    Objects without a push are left out. Up to `core.MAX_EXACT` objects the order is the
+    cheapest there is; beyond, `solve_gtsp` searches for one on the reduced problem.
     """
     count = len(graph.objects)
     if not count:
         return [], 0.0
-    if count <= MAX_EXACT:
-        best, following = cost_to_go(graph.costs, graph.masks, count)
+    if count <= core.MAX_EXACT:
+        best, following = core.cost_to_go(graph.costs, graph.masks, count)
         start = len(graph.pushes)
         return _order_after(following, graph.masks, 0, start, []), float(best[0, start])
     reduced = graph.to_gtsp()
@@ -65,9 +65,9 @@ def sequence_pushes(graph: PushGraph, simulated_cost: SimulatedCost, most: int) 
     count = len(graph.objects)
     if not count:
         return []
-    if count > MAX_EXACT:
+    if count > core.MAX_EXACT:
         return _by_tours(graph, simulated_cost, most)
-    best, following = cost_to_go(graph.costs, graph.masks, count)
+    best, following = core.cost_to_go(graph.costs, graph.masks, count)
     rest = np.array([best[graph.masks[n], n] for n in range(len(graph.masks))])
     guess = graph.costs[-1] + rest
     chosen = -1

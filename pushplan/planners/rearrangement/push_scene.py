@@ -10,14 +10,15 @@ from typing import Any
 
 import numpy as np
 
+from pushplan.core import interaction
+from pushplan.core import rearrangement as core
 from pushplan.interaction import QuasiStatic
-from pushplan.interaction.kernels import Bodies, Settings
+from pushplan.interaction.quasi_static import Settings
 from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.keep_out import keep_out
 from pushplan.planners.arguments import check_pusher
 from pushplan.planners.rearrangement.approach_lattice import ContactGrid, contact_grid
-from pushplan.planners.rearrangement.controller_kernels import PushingController
-from pushplan.planners.rearrangement.goal_kernels import ObjectGoal, all_done, make_object_goal
+from pushplan.planners.rearrangement.object_goal import make_object_goal
 from pushplan.planners.rearrangement.object_paths import (
     ObjectPaths,
     PushCostToGo,
@@ -27,7 +28,6 @@ from pushplan.planners.rearrangement.object_paths import (
 from pushplan.planners.rearrangement.push_starts import PushStarts
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.planners.rearrangement.rollout_cache import RolloutCache
-from pushplan.planners.rearrangement.route_kernels import RouteProblem
 from pushplan.planners.rearrangement.search_budget import SearchBudget
 from pushplan.world import Movables, World
 from pushplan.world.checks import BoolArray, FloatArray
@@ -72,7 +72,7 @@ def pose_distance(pose: FloatArray, other: FloatArray, size: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class PushScene:
-    """A world, and what the kernels need to know of it.
+    """A world, and what the core needs to know of it.
 
     Args:
         world: the snapshot; its goal is one for the objects.
@@ -115,7 +115,7 @@ class PushScene:
         The world, and with it where the robot is, stays as it is.
         """
         moved = self._changed(poses=np.ascontiguousarray(poses), cache=None)
-        for name in ("done", "remaining_now", "fine", "coarse", "route_problem", "starts"):
+        for name in ("done", "remaining_now", "fine", "coarse", "starts"):
             moved.__dict__.pop(name, None)
         return moved
 
@@ -147,11 +147,11 @@ class PushScene:
 
     @cached_property
     def poses(self) -> FloatArray:
-        """(K, 3) poses of the objects; a copy that kernels may read."""
+        """(K, 3) poses of the objects."""
         return np.ascontiguousarray(self.movables.poses)
 
     @cached_property
-    def _contacts(self) -> tuple[Bodies, Settings]:
+    def _contacts(self) -> tuple[interaction.Bodies, Settings]:
         config = self.config
         model = QuasiStatic(
             config.friction,
@@ -162,26 +162,34 @@ class PushScene:
         return model.bodies(self.world), model.settings(self.world)
 
     @property
-    def bodies(self) -> Bodies:
-        """Shapes for the interaction kernels."""
+    def bodies(self) -> interaction.Bodies:
+        """Robot, objects and walls as the core reads them."""
         return self._contacts[0]
 
     @property
     def settings(self) -> Settings:
-        """Numerical settings of the interaction kernels."""
+        """Numerical settings of the contact model."""
         return self._contacts[1]
 
+    def contacts(self) -> interaction.QuasiStatic:
+        """The contact model, with memory for one caller."""
+        return interaction.QuasiStatic(self.bodies, *self.settings)
+
+    def are_done(self, poses: FloatArray) -> BoolArray:
+        """(K,) whether objects at poses (K, 3) are where they belong."""
+        return core.all_done(poses, self.bodies, self.object_goal)
+
     @cached_property
-    def object_goal(self) -> ObjectGoal:
+    def object_goal(self) -> core.ObjectGoal:
         """When objects are done."""
         slack = _GOAL_SLACK * self.size + 2.0 * self.config.position_noise
         return make_object_goal(self.world.goal, self.world.static, slack)
 
     @cached_property
-    def controller(self) -> PushingController:
+    def controller(self) -> core.PushingController:
         """Parameters of the pushing controller for this robot."""
         step = _STEP * self.size
-        return PushingController(
+        return core.PushingController(
             step=step,
             turn=_CURVATURE * step / self.size,
             size=self.size,
@@ -194,7 +202,7 @@ class PushScene:
     @cached_property
     def done(self) -> BoolArray:
         """(K,) whether each object is where it belongs."""
-        return all_done(np.array(self.poses), self.bodies, self.object_goal)
+        return self.are_done(self.poses)
 
     @property
     def turn_cost(self) -> float:
@@ -234,12 +242,15 @@ class PushScene:
             world.robot, world.static, _COARSE_CELL, MARGIN, self.poses, self.bodies
         )
 
-    @cached_property
-    def route_problem(self) -> RouteProblem:
-        """The costs of legs and turns on the way to a push."""
+    def route_search(self, weights: FloatArray) -> core.RouteSearch:
+        """The costs of legs and turns on the way to a push.
+
+        Args:
+            weights: (K,) cost of carrying each object a metre along.
+        """
         robot = self.world.robot
         margin = MARGIN * self.size
-        return RouteProblem(
+        return core.RouteSearch(
             step=0.1 * self.size,
             turn_cost=self.turn_cost,
             arm=self.arm,
@@ -248,7 +259,7 @@ class PushScene:
             among=obstacles(keep_out(self.world)),
             poses=self.poses,
             bodies=self.bodies,
-            weights=self.contact_weights,
+            weights=weights,
         )
 
     @cached_property

@@ -8,15 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.interaction.kernels import sweep_path
-from pushplan.planners.rearrangement.goal_kernels import all_done
+from pushplan.core import rearrangement as core
 from pushplan.planners.rearrangement.push import Push
-from pushplan.planners.rearrangement.push_rollout_kernels import (
-    STAGES,
-    PushRollout,
-    RolloutLog,
-    roll_out,
-)
 from pushplan.planners.rearrangement.push_scene import PushScene, pose_distance
 from pushplan.planners.rearrangement.rollout_cache import Rollout
 from pushplan.world.checks import BoolArray, FloatArray
@@ -72,7 +65,7 @@ def simulate(
     follows_path = len(attempt.path) > 0
     found = []
     for s in range(len(rollout.steps))[-1 if attempt.relocates else 0 :]:
-        done = all_done(rollout.poses[s], scene.bodies, scene.object_goal)
+        done = scene.are_done(rollout.poses[s])
         delivered = done & ~scene.done
         homeward = delivered.any()
         if follows_path:
@@ -111,8 +104,7 @@ def _roll_out(scene: PushScene, attempt: PushAttempt, poses: FloatArray | None) 
     """Roll out a push, unless it is known what comes of it."""
     movables = scene.movables
     settings = scene.settings
-    count = len(scene.poses)
-    wanted = np.zeros(count, dtype=np.bool_)
+    wanted = np.zeros(len(scene.poses), dtype=np.bool_)
     wanted[list(attempt.wanted) or [attempt.target]] = True
     if attempt.friction is not None:
         settings = settings._replace(friction=float(attempt.friction))
@@ -133,31 +125,22 @@ def _roll_out(scene: PushScene, attempt: PushAttempt, poses: FloatArray | None) 
         if known is not None:
             return known
     scene.budget.used += 1
-    longest = int(scene.longest / scene.controller.step) + 2
-    shapes = ((longest, 3), (STAGES,), (STAGES, count, 3), (STAGES, count), (4,))
-    log = RolloutLog(*(np.zeros(shape) for shape in shapes))
-    problem = PushRollout(
+    track, steps, ends, lengths, box = core.PushRollout(
+        scene.bodies, scene.object_goal, *settings
+    ).run(
+        attempt.start,
+        scene.poses if poses is None else poses,
         target=attempt.target if len(attempt.path) else -1,
         path=attempt.path,
         shift=attempt.shift,
         limit=attempt.limit,
         wanted=wanted,
-        controller=scene.controller._replace(gain=attempt.gain),
-        bodies=scene.bodies,
-        settings=settings,
-        goal=scene.object_goal,
+        controller=scene.controller.with_gain(attempt.gain),
+        longest=int(scene.longest / scene.controller.step) + 2,
     )
-    # copies may be written to: one kernel for all
-    before = np.array(scene.poses if poses is None else poses)
-    stages, used = roll_out(np.array(attempt.start), before, problem, log)
-    rollout = Rollout(
-        log.track[:used].copy(),
-        log.steps[:stages].astype(np.int64),
-        log.poses[:stages],
-        log.lengths[:stages],
-    )
+    rollout = Rollout(track, steps, ends, lengths)
     if cache is not None:
-        cache.keep(key, movables, scene.poses, rollout, log.box)
+        cache.keep(key, movables, scene.poses, rollout, box)
     return rollout
 
 
@@ -179,9 +162,9 @@ def simulate_primitive(
     """
     after = np.array(scene.poses if poses is None else poses)
     out = np.empty((len(path), len(after), 3))
-    if sweep_path(path, after, scene.bodies, scene.settings, out) >= 0:
+    if scene.contacts().sweep(path, after, out) >= 0:
         return []
-    done = all_done(after, scene.bodies, scene.object_goal)
+    done = scene.are_done(after)
     if (scene.done & ~done).any():
         return []
     length = path_length(path)

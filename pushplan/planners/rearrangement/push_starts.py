@@ -10,10 +10,9 @@ from functools import cached_property
 
 import numpy as np
 
-from pushplan.geometry import convex_penetration
-from pushplan.motion.collision import ConvexObstacles, Footprint, footprint, is_free, obstacles
-from pushplan.planners.rearrangement.controller_kernels import along_path
-from pushplan.planners.rearrangement.push_pose_kernels import pose_behind_outline
+from pushplan.core import geometry, motion
+from pushplan.core import rearrangement as core
+from pushplan.motion.collision import footprint, obstacles
 from pushplan.world import Movables, RobotModel, StaticMap
 from pushplan.world.checks import FloatArray
 from pushplan.world.outline import transform
@@ -37,7 +36,7 @@ def heading_axes(heading: float) -> tuple[FloatArray, FloatArray]:
 
 def initial_heading(path: FloatArray, ahead: float) -> float:
     """Heading [rad] from the start of a path to a point some distance along it [m]."""
-    x, y, _, _ = along_path(path[0, 0], path[0, 1], path, 0.0, ahead)
+    x, y, _, _ = core.along_path(path[0, 0], path[0, 1], path, 0.0, ahead)
     return math.atan2(y - path[0, 1], x - path[0, 0])
 
 
@@ -70,7 +69,7 @@ class PushStarts:
             shift: how far the robot's middle is to the left of the object [m].
         """
         outline = self.movables.outline(k)
-        return pose_behind_outline(np.array(self.poses[k]), outline, heading, shift, self.reach)
+        return core.pose_behind(self.poses[k], outline, heading, shift, self.reach)
 
     def around(self, k: int) -> Iterator[FloatArray]:
         """Poses (3,) around object ``k`` that touch nothing, evenly spread."""
@@ -86,13 +85,13 @@ class PushStarts:
         return itertools.islice(free, _STARTS)
 
     @cached_property
-    def _fit(self) -> tuple[Footprint, ConvexObstacles]:
-        return footprint(self.robot, self.margin), obstacles(self.static)
+    def _walls(self) -> motion.CollisionChecker:
+        shape = footprint(self.robot, self.margin)
+        return motion.CollisionChecker(shape, obstacles(self.static))
 
     def fits(self, pose: FloatArray) -> bool:
         """Return True if the robot fits at a pose (3,) among static obstacles."""
-        shape, among = self._fit
-        return bool(is_free(pose, shape, among, np.empty_like(shape.vertices)))
+        return self._walls.is_free(pose)
 
     def is_clear(self, pose: FloatArray) -> bool:
         """Return True if the robot at a pose (3,) overlaps no object."""
@@ -102,6 +101,6 @@ class PushStarts:
             outline = np.ascontiguousarray(movables.outline_world(k))
             for part in self.robot.contact_parts:
                 body = np.ascontiguousarray(transform(pose, part))
-                if convex_penetration(body, outline)[0] > 0.0:
+                if geometry.convex_penetration(body, outline)[0] > 0.0:
                     return False
         return True

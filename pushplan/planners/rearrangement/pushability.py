@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from pushplan.core import rearrangement as core
 from pushplan.planners.rearrangement.candidates import attempts
-from pushplan.planners.rearrangement.goal_kernels import REMOVED
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.push_simulator import PushAttempt, end_of, simulate
 from pushplan.world.checks import FloatArray
@@ -37,7 +37,7 @@ def can_be_pushed(scene: PushScene, k: int, horizon: float) -> bool:
         if now <= horizon:
             return any(target in push.delivers for push in simulate(scene, attempt))
         end = end_of(scene, replace(attempt, limit=min(attempt.limit, horizon)))
-        return bool(end[0] >= 0.5 * REMOVED or costs.at(end) <= now - _ADVANCE * horizon)
+        return bool(end[0] >= 0.5 * core.REMOVED or costs.at(end) <= now - _ADVANCE * horizon)
 
     return any(
         not scene.budget.is_over
@@ -61,7 +61,7 @@ def failing_margins(scene: PushScene, k: int, poses: FloatArray, horizon: float)
 
     def delivers(error: FloatArray) -> bool:
         displaced = np.array(poses)
-        if displaced[k, 0] < 0.5 * REMOVED:
+        if displaced[k, 0] < 0.5 * core.REMOVED:
             displaced[k] += error * units
         after = scene.with_objects_at(displaced)
         return bool(after.done[k]) or can_be_pushed(after, k, horizon)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any
@@ -10,21 +9,10 @@ from typing import Any
 import numpy as np
 
 from pushplan.control import EpisodeClock
-from pushplan.control.recovery import warm_up_recovery
-from pushplan.geometry.transforms import arc_step
 from pushplan.planners.arguments import check_pusher
-from pushplan.planners.pushing import warm_up as warm_up_pushing
-from pushplan.planners.rearrangement.approach import approach_tree
-from pushplan.planners.rearrangement.controller_kernels import steer_push
-from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
-from pushplan.planners.rearrangement.relocation import relocating_pushes
-from pushplan.planners.warm_up_worlds import warm_up_worlds
 from pushplan.world import Twist, World
 from pushplan.world.checks import expect
-
-_STEPS = 150
-_PERIOD = 0.2  # [s]
 
 
 class RearrangementPolicy(ABC):
@@ -44,10 +32,6 @@ class RearrangementPolicy(ABC):
     def reset(self, world: World, rng: np.random.Generator) -> None:
         """Forget the last episode."""
         self._forget()
-
-    def warm_up(self) -> None:
-        """Load the kernels that an episode may need."""
-        _drive_in_small_worlds(type(self))
 
     def act(self, world: World, observation: Any = None) -> Twist:
         """The velocity for this step; stops when nothing is left to be done.
@@ -75,38 +59,3 @@ class RearrangementPolicy(ABC):
     @abstractmethod
     def _act(self, world: World) -> Twist:
         """The velocity for an instant."""
-
-
-@functools.cache
-def warm_up_rearrangement() -> None:
-    """Solve, push and look for every kind of push; no kernel is for one kind of task alone."""
-    warm_up_pushing()
-    scene = _small_scene()
-    relocating_pushes(scene, 0, approach_tree(scene))
-    warm_up_recovery()
-
-
-@functools.cache
-def warm_up_steering() -> None:
-    """Steer a push outside rollouts, as `GeometricPusher` does; few episodes come to that."""
-    here = np.zeros(3)
-    scene = _small_scene()
-    steer_push(here, here, np.eye(2), 0.0, 0.0, scene.controller)
-
-
-@functools.cache
-def _drive_in_small_worlds(policy: Callable[[], RearrangementPolicy]) -> None:
-    """Let a new policy plan and drive for boxes in each kind of task."""
-    for world in warm_up_worlds("rearrangement"):
-        driven = policy()
-        for _ in range(_STEPS):
-            twist = driven.act(world)
-            pose = np.empty(3)
-            # nothing is in the robot's way
-            here = np.array(world.robot_pose)
-            arc_step(here, _PERIOD * twist.linear, _PERIOD * twist.angular, pose)
-            world = world.moved(robot_pose=pose, time=world.time + _PERIOD)
-
-
-def _small_scene() -> PushScene:
-    return PushScene(warm_up_worlds("rearrangement")[0], RearrangementConfig())

@@ -17,6 +17,7 @@ from functools import cached_property
 
 import numpy as np
 
+from pushplan.core import rearrangement as core
 from pushplan.planners.rearrangement.approach import (
     ApproachTree,
     approach_tree,
@@ -25,12 +26,10 @@ from pushplan.planners.rearrangement.approach import (
     simulate_route,
 )
 from pushplan.planners.rearrangement.candidates import GAIN
-from pushplan.planners.rearrangement.goal_kernels import REMOVED
 from pushplan.planners.rearrangement.push_scene import PushScene, pose_distance
 from pushplan.planners.rearrangement.push_starts import initial_heading
 from pushplan.planners.rearrangement.pushability import MARGINS, can_be_pushed, failing_margins
 from pushplan.planners.rearrangement.rollout_cache import Primitive
-from pushplan.planners.rearrangement.short_arc_kernels import sweep_arcs
 from pushplan.world.checks import FloatArray
 
 _Cell = tuple[float, ...]
@@ -234,19 +233,15 @@ class RelocationSearch:
         """Drive on from a state along every arc; each place that the object gets to is a state."""
         scene = self._scene
         k = self._k
-        # copies may be written to: one kernel for all
-        start = np.array(state.track[-1])
-        before = np.array(state.poses)
-        tracks, poses, marks = sweep_arcs(
-            start,
-            before,
+        tracks, poses, marks = core.sweep_arcs(
+            scene.contacts(),
+            state.track[-1],
+            state.poses,
             self._arcs,
             self._steps,
             k,
             scene.size,
             _SPACING,
-            scene.bodies,
-            scene.settings,
         )
         arcs, ends = marks.T
         places = self._cells(poses[arcs, ends, k], _PLACE, _TURN)
@@ -262,7 +257,7 @@ class RelocationSearch:
 
     def _rest(self, poses: FloatArray) -> FloatArray:
         """(N,) what is left to be done with the object at poses (N, 3) [m]."""
-        gone = poses[:, 0] >= 0.5 * REMOVED
+        gone = poses[:, 0] >= 0.5 * core.REMOVED
         return np.where(gone, 0.0, self._cost_to_go.along(poses))
 
     def _side(self, state: _State) -> _Cell:

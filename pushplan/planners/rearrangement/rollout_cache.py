@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pushplan.planners.rearrangement.goal_kernels import REMOVED
+from pushplan.core import rearrangement as core
 from pushplan.world import Movables
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
@@ -119,8 +119,10 @@ class RolloutCache:
         lengths = np.zeros(after.shape[:2])
         after[:, moved] = old.poses
         lengths[:, moved] = old.lengths
-        gone = after[:, :, 0] >= 0.5 * REMOVED
-        after[:, :, 0] = np.where(gone, REMOVED * (1.0 + np.arange(len(poses))), after[:, :, 0])
+        gone = after[:, :, 0] >= 0.5 * core.REMOVED
+        after[:, :, 0] = np.where(
+            gone, core.REMOVED * (1.0 + np.arange(len(poses))), after[:, :, 0]
+        )
         return Rollout(old.track, old.steps, after, lengths)
 
     def keep(

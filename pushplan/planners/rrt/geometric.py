@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from ompl import base, geometric, util
 
-from pushplan.compiled import kernel, owned
-from pushplan.geometry import core_distance
-from pushplan.motion.collision import ConvexObstacles, obstacles
+from pushplan.core import motion as core
+from pushplan.motion.collision import obstacles
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.polyline_plan import polyline_result
 from pushplan.motion.random_tree.ompl_calls import (
@@ -80,14 +79,14 @@ class GeometricRRT:
             return call.result(PlanStatus.START_BLOCKED)
         if goal_is_outside(world):
             return call.result(PlanStatus.GOAL_UNREACHABLE)
-        start = owned(world.robot_pose[:2])
+        x, y = world.robot_pose[:2].tolist()
         size = world.robot.circumscribed_radius
         wide = config.clearance * size
         narrow = world.robot.inscribed_radius
         passes = [(boxes, wide), ([], wide), ([], min(size, wide)), ([], min(narrow, wide))]
         for blocked, radius in passes:
             among = obstacles(keep_out(world), blocked)
-            if _near(start, among, radius):
+            if among.touches_disc(x, y, radius):
                 continue  # the robot starts closer to something than this pass allows
             points, used = self._grow(call, among, radius, iterations)
             iterations += used
@@ -98,11 +97,12 @@ class GeometricRRT:
         return call.result(call.stopped_status, iterations=iterations)
 
     def _grow(
-        self, call: PlanningCall, among: ConvexObstacles, radius: float, before: int
+        self, call: PlanningCall, among: core.ConvexObstacles, radius: float, before: int
     ) -> tuple[FloatArray | None, int]:
         """One pass: the corners of a path, or None, and the samples that it took."""
         config = self.config
         world = call.world
+        bounds = world.static.bounds
         check = call.check
         rng = call.rng
         used = 0
@@ -118,14 +118,13 @@ class GeometricRRT:
                 return None, used
             util.RNG.setSeed(seed)
             space = _plane()
-            space.setBounds(plane_bounds(among.bounds))
+            space.setBounds(plane_bounds(bounds))
             info = base.SpaceInformation(space)
-            point = np.empty(2)
 
             def valid(state: base.State) -> bool:
-                point[0] = state[0]
-                point[1] = state[1]
-                return bool(space.satisfiesBounds(state)) and not _near(point, among, radius)
+                if not space.satisfiesBounds(state):
+                    return False
+                return not among.touches_disc(state[0], state[1], radius)
 
             info.setStateValidityChecker(valid)
             size = world.robot.circumscribed_radius
@@ -140,7 +139,7 @@ class GeometricRRT:
             planner.setGoalBias(_GOAL_BIAS)
 
             def draw(state: base.State) -> None:
-                state[0], state[1] = _goal_point(world.navigation_goal, among.bounds, rng).tolist()
+                state[0], state[1] = _goal_point(world.navigation_goal, bounds, rng).tolist()
 
             def distance(state: base.State) -> float:
                 return world.navigation_goal.distance(state[0], state[1])
@@ -165,19 +164,3 @@ def _goal_point(goal: NavigationGoal, bounds: FloatArray, rng: np.random.Generat
         if goal.contains(candidate):
             return candidate
     return np.clip(getattr(goal, "center", point), low, high)
-
-
-@kernel(allocates=True)
-def _near(point: FloatArray, among: ConvexObstacles, radius: float) -> bool:
-    """Return True if a disc about ``point`` (2,) touches an obstacle."""
-    x = point[0]
-    y = point[1]
-    for s in range(among.boxes.shape[0]):
-        box = among.boxes[s]
-        if x + radius < box[0] or x - radius > box[2] or y + radius < box[1] or y - radius > box[3]:
-            continue
-        first = among.offsets[s]
-        last = among.offsets[s + 1]
-        if core_distance(x, y, among.vertices, first, last) < radius:
-            return True
-    return False

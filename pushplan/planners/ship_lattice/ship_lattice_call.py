@@ -8,14 +8,14 @@ from functools import partial
 
 import numpy as np
 
-from pushplan.compiled import owned
+from pushplan.core import motion as core
+from pushplan.core import search
 from pushplan.interaction import InteractionModel
 from pushplan.interaction.path_sweepers import path_sweeper
 from pushplan.motion.coarse_path import reachable
-from pushplan.motion.collision import first_blocked, footprint, is_free, obstacles
+from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.goal_region import goal_numbers
 from pushplan.motion.keep_out import keep_out
-from pushplan.motion.path_problem import SweptPath
 from pushplan.motion.room_ahead import Room, gets_away
 from pushplan.motion.speed_profile import check_turns, goal_is_outside, timed_plan, turning_radius
 from pushplan.motion.state_lattice.built_lattice import BuiltLattice
@@ -23,13 +23,12 @@ from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
 from pushplan.motion.state_lattice.lattice_config import SPACING
 from pushplan.motion.state_lattice.lattice_path import bare_path, lay_path
 from pushplan.motion.state_lattice.lattice_search import open_search, path_arcs
+from pushplan.motion.swept_path import SweptPath
 from pushplan.motion.time_slicing import Pace, Stopped
 from pushplan.planners.ship_lattice.floe_costs import floe_costs
 from pushplan.planners.ship_lattice.nearby_objects import NearbyObjects
 from pushplan.planners.ship_lattice.ship_lattice_config import ShipLatticeConfig
-from pushplan.planners.ship_lattice.ship_path_improver import ShipPathImprover
-from pushplan.planners.ship_lattice.shortcut_proposals import ShortcutProblem
-from pushplan.search.astar import FOUND, PAUSED
+from pushplan.planners.ship_lattice.ship_path_improver import ShipPathImprover, ShortcutProblem
 from pushplan.world import GoalLine, Plan, PlanStatus
 from pushplan.world.checks import FloatArray
 from pushplan.world.planning_call import PlanningCall
@@ -60,7 +59,6 @@ class ShipLatticeCall:
         self.lattice_cost = math.inf
         self.first_solution_s = float("nan")
         self.built: BuiltLattice | None = None
-        self.side = 0.0
         self.near: NearbyObjects | None = None
         self.improver: ShipPathImprover | None = None
         self._pace = Pace()
@@ -78,7 +76,7 @@ class ShipLatticeCall:
         world = self.world
         shape = footprint(world.robot)
         walls = obstacles(keep_out(world))
-        if not is_free(owned(world.robot_pose), shape, walls, np.empty_like(shape.vertices)):
+        if not core.CollisionChecker(shape, walls).is_free(world.robot_pose):
             return PlanStatus.START_BLOCKED
         if goal_is_outside(world):
             return PlanStatus.GOAL_UNREACHABLE
@@ -99,7 +97,7 @@ class ShipLatticeCall:
                 floe_costs=partial(floe_costs, self.config),
                 stopped=self.stopped,
             )
-            self.side = side
+            self._set_side(side)
             found = self._search(builder, self.config.searches[0])
             if found is None:
                 return None
@@ -114,7 +112,7 @@ class ShipLatticeCall:
         if self.stopped():
             return None
         room = Room(shape, walls, goal_numbers(self.goal, 0.0), 0.0)
-        if not gets_away(room, owned(world.robot_pose), self.size, world.robot.turning_radius):
+        if not gets_away(room, world.robot_pose, self.size, world.robot.turning_radius):
             return PlanStatus.START_BLOCKED
         # the lattice is coarse: where it leads nowhere there may be a path nevertheless
         if reachable(world, self.stopped) or self.stopped():
@@ -136,21 +134,21 @@ class ShipLatticeCall:
         """Search the lattice; return True if a path was found, None if stopped before."""
         built = builder.build(factor)
         star, curves = open_search(built, builder)
-        result = PAUSED
+        result = search.SearchStatus.PAUSED
         while not self.stopped():
             for first, last in self._pace.pieces(_BATCH, self.stopped):
                 result = star.run(last - first)
-                if result != PAUSED:
+                if result != search.SearchStatus.PAUSED:
                     break
             self.iterations += 1
-            if result != PAUSED:
+            if result != search.SearchStatus.PAUSED:
                 break
         else:
             return None
-        self.expanded += star.expanded
-        if result != FOUND:
+        self.expanded += star.tree.expanded
+        if result != search.SearchStatus.FOUND:
             return None if builder.clipped else False  # there may be a path elsewhere
-        arcs = path_arcs(built, star, curves)
+        arcs = path_arcs(built, star.tree, curves, star.goal)
         poses, curvatures = lay_path(built, arcs, self.world, self.config)
         if not self._free(poses):
             return False
@@ -165,24 +163,24 @@ class ShipLatticeCall:
             self._consider(poses, curvatures)
         return True
 
-    def _free(self, poses: FloatArray) -> bool:
-        """Return True if a path is clear of walls, and its origin of all bounds but those ahead."""
+    def _set_side(self, side: float) -> None:
+        """Keep the robot's origin so far [m] inside all bounds but those ahead, if it can."""
         world = self.world
-        low = world.static.bounds[:2] + self.side
-        high = world.static.bounds[2:] - self.side
+        low = world.static.bounds[:2] + side
+        high = world.static.bounds[2:] - side
         if isinstance(self.goal, GoalLine):
             high = np.where(self.goal.normal > 0.7, world.static.bounds[2:], high)
             low = np.where(self.goal.normal < -0.7, world.static.bounds[:2], low)
         start = world.robot_pose[:2]
         low = np.minimum(low, start)
         high = np.maximum(high, start)
-        shape = footprint(world.robot)
-        walls = obstacles(keep_out(world))
-        walls = walls._replace(
-            bounds=np.concatenate([low - 1e-6 * self.size, high + 1e-6 * self.size])
-        )
-        scratch = np.empty_like(shape.vertices)
-        return bool(first_blocked(poses, len(poses), shape, walls, scratch) == len(poses))
+        bounds = np.concatenate([low - 1e-6 * self.size, high + 1e-6 * self.size])
+        walls = obstacles(keep_out(world), bounds=bounds)
+        self._checker = core.CollisionChecker(footprint(world.robot), walls)
+
+    def _free(self, poses: FloatArray) -> bool:
+        """Return True if a path is clear of walls, and its origin of all bounds but those ahead."""
+        return self._checker.first_blocked(poses) == len(poses)
 
     def _improve(self, builder: LatticeBuilder) -> None:
         """Sweep the path, look at others, and change the best at random."""

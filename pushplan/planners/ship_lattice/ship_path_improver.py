@@ -4,14 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
+from pushplan.core import planners as core
 from pushplan.interaction.path_sweepers import PathSweeper
-from pushplan.planners.ship_lattice.shortcut_proposals import ShortcutProblem, propose
 from pushplan.world.checks import FloatArray
 
 _PORTION = 8  # poses that are swept between two looks at the stop rule
+
+
+class ShortcutProblem(NamedTuple):
+    """Constraints on a changed path, and the scale of its changes."""
+
+    radius: float  # Least turning radius [m]
+    spacing: float  # Greatest distance between two poses [m]
+    spread: float  # Typical sideways displacement [m]
+    most_turn: float  # Greatest turn of a curve [rad]
+    end_fraction: float  # Fraction of the changes that are changes of the end
+    goal: FloatArray  # (4,) point x, y and unit normal of the line where the path ends
 
 
 @dataclass(frozen=True)
@@ -83,7 +95,11 @@ class ShipPathImprover:
         return True
 
     def shortcut(self, rng: np.random.Generator) -> bool:
-        """Try one random change of the best path; return True if it was kept."""
+        """Try one random change of the best path; return True if it was kept.
+
+        Shortcutting after Geraerts and Overmars, "Creating high-quality paths for motion planning"
+        (2007).
+        """
         assert self.best is not None
         best = self.best
         count = len(best.poses)
@@ -93,12 +109,12 @@ class ShipPathImprover:
         problem = self.problem
         if part < count:  # the end of what is swept is not the end of the path
             problem = problem._replace(end_fraction=0.0)
-        first, new, size = propose(
+        first, new, size = core.propose_change(
             best.poses[:part],
             best.curvatures[:part],
             rng.random(4),
             rng.standard_normal(2),
-            problem,
+            np.hstack(problem),
             out,
             curvatures,
         )

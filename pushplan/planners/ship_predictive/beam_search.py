@@ -8,10 +8,9 @@ from typing import Generic
 
 import numpy as np
 
-from pushplan.planners.ship_predictive.arc_kernels import arc_ahead, steer_on
+from pushplan.core import planners as core
 from pushplan.planners.ship_predictive.beam_node import BeamNode, Ice, StatePropagator
 from pushplan.planners.ship_predictive.channel_view import ChannelView
-from pushplan.planners.ship_predictive.ice_cost_to_go import cost_ahead
 from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
 from pushplan.world import StopCheck
 from pushplan.world.checks import FloatArray
@@ -97,7 +96,7 @@ class BeamSearch(Generic[Ice]):
         view = self.view
         count = max(1, round(self.config.arc / SPACING))
         step = SPACING * view.length
-        arc: FloatArray = arc_ahead(view.channel, pose, curvature, step, count)
+        arc = core.arc_ahead(*view.channel, pose, curvature, step, count)
         return arc[:0] if view.askew and not view.inside(arc) else arc
 
     def _cost(self, length: float, work: float, arc: FloatArray, done: float | None) -> float:
@@ -107,7 +106,7 @@ class BeamSearch(Generic[Ice]):
         step = SPACING * view.length
         ahead = step * (len(arc) - 1)
         mass = view.world.robot.mass
-        expected, rest = cost_ahead(view.costs, arc, step)
+        expected, rest = view.costs.cost_ahead(arc, step)
         done = expected if done is None else done
         return mass * (length + ahead) + w * (work + done) + rest
 
@@ -174,7 +173,7 @@ class BeamSearch(Generic[Ice]):
         mass = view.world.robot.mass
         if node.pose[1] < view.channel.goal:
             out = np.empty((most, 4))
-            count = steer_on(view.costs, node.pose, view.curvatures, step, out)
+            count = view.costs.steer_on(node.pose, view.curvatures, step, out)
             if count == 0 or not view.inside(out[:count]):
                 return None
             followed = self.follow(node, np.concatenate([[[*node.pose, 0.0]], out[:count]]))

@@ -4,28 +4,33 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from pushplan.interaction.ice_bodies import IceBodies, IceSettings, select_bodies
-from pushplan.interaction.ice_interaction import IceInteraction
+from pushplan.core import interaction
+from pushplan.core import planners as core
+from pushplan.interaction.ice_interaction import IceInteraction, IceSettings
 from pushplan.motion.speed_profile import check_turns
-from pushplan.planners.ship_predictive.arc_kernels import Channel
-from pushplan.planners.ship_predictive.ice_cost_to_go import (
-    HEADINGS,
-    Floes,
-    IceCostToGo,
-    fill_field,
-    fill_table,
-)
 from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
-from pushplan.world import GoalLine, InvalidInputError, PlanStatus, World
+from pushplan.world import GoalLine, InvalidInputError, Movables, PlanStatus, World
 from pushplan.world.checks import FloatArray, IntArray
 from pushplan.world.outline import areas_and_centroids
 
+STEEPEST = math.radians(80.0)
+"""Greatest angle between the ship and the direction ahead in the table of costs to go."""
+_HEADINGS = 17  # of the table
 _MOST_PLACES = 20_000  # rows times columns of the table of costs to go, about
 _ROW = 0.12  # distance between its rows [hull lengths]
 _COLUMN = 0.1  # distance between its columns [hull lengths]
+
+
+class Channel(NamedTuple):
+    """Places where the ship's origin may be."""
+
+    goal: float  # y of the line to which the search goes [m]
+    low: FloatArray  # (2,) least x, y [m]
+    high: FloatArray  # (2,) greatest x, y [m]
 
 
 @dataclass(frozen=True)
@@ -38,10 +43,11 @@ class ChannelView:
     away: float  # y of the goal line [m]
     channel: Channel  # region of the ship's origin; its goal is the goal line, or one before it
     near: IntArray  # numbers of the floes that may be met
+    objects: Movables  # they themselves, in the world frame
     floes: FloatArray  # (K, 3) their poses
-    bodies: IceBodies  # their shapes and the hull's
+    bodies: interaction.IceBodies  # their shapes and the hull's
     settings: IceSettings  # of their motion
-    costs: IceCostToGo  # costs to go
+    costs: core.IceCostToGo  # costs to go
     length: float  # of the hull [m]
     radius: float  # least turning radius [m]
     curvatures: FloatArray  # (B,) that the search uses [1/m]
@@ -96,7 +102,7 @@ def channel_view(world: World, config: PredictiveConfig, model: IceInteraction) 
             f"the predictive ship planners go to a GoalLine, got a {type(line).__name__}"
         )
     check_turns(world.robot)
-    bodies = model.bodies(world)
+    model.bodies(world)  # says if the world is none for it
     robot = world.robot
     length = float(np.ptp(robot.vertices[:, 0]))
     away = float((line.point - world.robot_pose[:2]) @ line.normal)
@@ -112,7 +118,7 @@ def channel_view(world: World, config: PredictiveConfig, model: IceInteraction) 
     aside = 0.5 * max(goal, 0.0) + 5.0 * length  # no path leads farther from the straight one
     low[0], high[0] = max(low[0], min(-aside, high[0])), min(high[0], max(aside, low[0]))
     channel = Channel(goal, low, high)
-    bodies = select_bodies(bodies, near)
+    objects = world.movables.select(near)
     floes = np.ascontiguousarray(floes[near])
     return ChannelView(
         world=world,
@@ -121,10 +127,11 @@ def channel_view(world: World, config: PredictiveConfig, model: IceInteraction) 
         away=away,
         channel=channel,
         near=near,
+        objects=objects,
         floes=floes,
-        bodies=bodies,
+        bodies=model.bodies(world, near),
         settings=model.settings(world),
-        costs=_costs_to_go(world, config, bodies, floes, channel, radius),
+        costs=_costs_to_go(world, config, objects, floes, channel, radius),
         length=length,
         radius=radius,
         curvatures=np.linspace(-1.0, 1.0, 2 * config.curvatures + 1) / radius,
@@ -162,11 +169,19 @@ def _box(
 def _costs_to_go(
     world: World,
     config: PredictiveConfig,
-    bodies: IceBodies,
+    objects: Movables,
     floes: FloatArray,
     channel: Channel,
     radius: float,
-) -> IceCostToGo:
+) -> core.IceCostToGo:
+    """Cost of the rest of the path if no floe moved: a table that guides the search.
+
+    The table holds, for the ship's place and heading, the least of travel plus weighted work on a
+    grid, by dynamic programming from the goal line backwards. The work of a metre is taken from the
+    floes as they lie: each counts with its mass times 1 - d² / R², d being the distance of the bow
+    from its centre and R their two half widths (after the collision cost of AUTO-IceNav, arXiv
+    2411.17155), and more than in proportion where floes crowd.
+    """
     vertices = world.robot.vertices
     length = float(np.ptp(vertices[:, 0]))
     away = max(channel.goal, 0.0)
@@ -179,8 +194,8 @@ def _costs_to_go(
     column = max(width / (columns - 1), 0.1 * _COLUMN * length)
     cell = 0.5 * column
     rows = max(2, math.ceil(ahead / (_ROW * coarser)) + 1)
-    costs = IceCostToGo(
-        table=np.empty((rows, columns, HEADINGS)),
+    costs = core.IceCostToGo(
+        table=np.empty((rows, columns, _HEADINGS)),
         field=np.empty((math.ceil((away + 3.0 * length) / cell) + 1, 2 * columns - 1)),
         left=float(channel.low[0]),
         low=-length,  # the tables begin a hull length behind the ship
@@ -189,11 +204,10 @@ def _costs_to_go(
         cell=cell,
         bow=0.7 * float(vertices[:, 0].max()),
         mass=world.robot.mass,
-        weight=float(config.push_weight),
+        weight=config.push_weight,
         radius=radius,
     )
-    radii = np.sqrt(areas_and_centroids(bodies.vertices, bodies.offsets)[0] / np.pi)
-    half_beam = 0.5 * float(np.ptp(vertices[:, 1]))
-    fill_field(Floes(floes, radii, bodies.masses, half_beam), costs)
-    fill_table(costs)
+    radii = np.sqrt(areas_and_centroids(objects.vertices, objects.offsets)[0] / np.pi)
+    costs.fill_field(floes, radii, objects.masses, 0.5 * float(np.ptp(vertices[:, 1])))
+    costs.fill_table()
     return costs

@@ -6,8 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from pushplan.interaction.ice_bodies import ice_problem
-from pushplan.interaction.ice_contacts import sweep_ice
+from pushplan.core import interaction as core
 from pushplan.planners.ship_predictive.beam_node import BeamNode
 from pushplan.planners.ship_predictive.channel_view import ChannelView
 from pushplan.world.checks import FloatArray
@@ -20,7 +19,7 @@ class FloePropagator:
 
     def __init__(self, view: ChannelView) -> None:
         self._floes = view.floes
-        self._problem = ice_problem(view.bodies, view.settings)
+        self._contacts = core.IceContacts(view.bodies, *view.settings)
 
     def start(self) -> FloatArray:
         """The floes now."""
@@ -40,7 +39,7 @@ class FloePropagator:
         """(N, K, 3) poses of the floes at each pose (N, 3) of a path, and the work [kg m]."""
         poses = floes.copy()
         out = np.empty((len(path), *poses.shape))
-        return out, sweep_ice(np.ascontiguousarray(path), poses, self._problem, out)
+        return out, self._contacts.sweep(np.ascontiguousarray(path), poses, out)
 
     def trace(self, node: BeamNode[FloatArray], stopped: Callable[[], bool]) -> FloatArray:
         """(N, K, 3) poses of the floes at each pose of a path: they are known."""

@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from pushplan.core import interaction as core
 from pushplan.interaction.network import IceNetwork
-from pushplan.interaction.occupancy import CHANNELS, PATCH_CELLS, cell_size, ice_density
-from pushplan.interaction.occupancy_kernels import Patch, cover_objects, cover_sweep
+from pushplan.interaction.occupancy import CHANNELS, PATCH_CELLS, Patch, cell_size, ice_density
 from pushplan.planners.ship_predictive.beam_node import BeamNode
 from pushplan.planners.ship_predictive.channel_view import ChannelView
 from pushplan.planners.ship_predictive.floe_propagator import FloePropagator
@@ -36,9 +36,9 @@ class MapPropagator:
         self._corner = self._cell * np.floor(low / self._cell)
         columns, rows = np.ceil((high - self._corner) / self._cell).astype(int)
         self._start = np.zeros((max(rows, PATCH_CELLS), max(columns, PATCH_CELLS)), np.float32)
-        bodies = view.bodies
+        shapes = (view.objects.vertices, view.objects.offsets)
         frame = np.array([*self._corner, 0.0])
-        cover_objects(view.floes, bodies.vertices, bodies.offsets, frame, self._cell, self._start)
+        core.cover_objects(view.floes, *shapes, frame, self._cell, self._start)
 
     def start(self) -> Patch:
         """The map now."""
@@ -48,7 +48,7 @@ class MapPropagator:
         self, ices: Sequence[Patch], paths: Sequence[FloatArray]
     ) -> list[tuple[Patch, float]]:
         """The maps after each piece of path, and the work on the ice [kg m]; one network call."""
-        bodies = self._view.bodies
+        robot = self._view.world.robot
         patches = np.empty((len(ices), len(CHANNELS), PATCH_CELLS, PATCH_CELLS), np.float32)
         places = [self._place(path) for path in paths]
         for i, (ice, path, (row, column)) in enumerate(zip(ices, paths, places, strict=True)):
@@ -56,9 +56,9 @@ class MapPropagator:
             corner = self._corner + self._cell * np.array([column, row])
             frame = np.array([*corner, 0.0])
             poses = np.ascontiguousarray(path)
-            hull = (bodies.hull, bodies.hull_offsets, frame, self._cell)
-            cover_sweep(poses[:1], *hull, patches[i, 1])
-            cover_sweep(poses, *hull, patches[i, 2])
+            hull = (robot.vertices, robot.offsets, frame, self._cell)
+            core.cover_sweep(poses[:1], *hull, patches[i, 1])
+            core.cover_sweep(poses, *hull, patches[i, 2])
         after, work = self._network.predict_patches(patches)
         found = []
         for i, (ice, (row, column)) in enumerate(zip(ices, places, strict=True)):

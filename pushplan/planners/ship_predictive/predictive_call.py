@@ -140,7 +140,7 @@ class PredictiveCall:
         work = self._best.work
         objects = None
         if self._objects is not None:
-            work = float((step_lengths(self._objects) @ view.bodies.masses).sum())
+            work = float((step_lengths(self._objects) @ view.objects.masses).sum())
             objects = np.repeat(world.movables.poses[None], len(path), axis=0)
             objects[:, view.near] = view.to_world(self._objects)
         chords = step_lengths(path)

@@ -7,22 +7,20 @@ from collections.abc import Callable
 
 import numpy as np
 
+from pushplan.core import search
 from pushplan.interaction.network import IceNetwork
-from pushplan.interaction.occupancy import PATCH_CELLS
-from pushplan.interaction.occupancy_kernels import Patch
+from pushplan.interaction.occupancy import PATCH_CELLS, Patch
 from pushplan.motion.speed_profile import timed_plan, turning_radius
 from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
 from pushplan.motion.state_lattice.lattice_config import LatticeConfig
 from pushplan.motion.state_lattice.lattice_path import bare_path, lay_path, sample_arcs
 from pushplan.motion.state_lattice.lattice_search import open_search, path_arcs
-from pushplan.motion.state_lattice.pose_lattice import bound_at, place_of, reached, successors
 from pushplan.motion.time_slicing import go_on
 from pushplan.planners.ship_predictive.beam_search import SPACING
 from pushplan.planners.ship_predictive.channel_view import ChannelView
 from pushplan.planners.ship_predictive.map_propagator import MapPropagator
-from pushplan.search.astar import SIZE, AStar, SearchState, offer, take
 from pushplan.world import Plan, World
-from pushplan.world.checks import FloatArray, IntArray
+from pushplan.world.checks import FloatArray
 
 LATTICE = LatticeConfig.published()
 
@@ -50,34 +48,34 @@ class PublishedSearch:
         self._unit = 0.5 * view.length
         opened, self._curves = open_search(self._built, builder)
         branching = int(np.diff(self._built.motions.first).max())
-        self._star = AStar(self._built.lattice, self._built.size, branching)
+        self._tree = search.SearchTree(self._built.size)
         self._successors = (
             np.empty(branching, np.int64),
             np.empty(branching),
             np.empty(branching, np.int64),
         )
         self._maps: dict[int, Patch] = {}
-        self._open(opened.state)
+        self._open(opened.tree)
 
-    def _open(self, state: SearchState) -> None:
+    def _open(self, opened: search.SearchTree) -> None:
         """Begin at the robot's node, or where the short curves from the robot lead to."""
-        nodes = state.heap[: state.counters[SIZE]].copy()
-        if not len(nodes):  # no place of the lattice is free
+        nodes = opened.open_nodes.tolist()
+        if not nodes:  # no place of the lattice is free
             return
         if not self._curves:
-            self._maps[int(nodes[0])] = self._propagator.start()
-            self._star.start(int(nodes[0]))
+            self._maps[nodes[0]] = self._propagator.start()
+            self._tree.offer(nodes[0], 0.0, 0.0, -1, -1)
             return
-        edges = state.edges[nodes]
-        arcs = [self._curves[-2 - edge] for edge in edges.tolist()]
-        paths = [self._path(self._view.start, arc) for arc in arcs]
-        self._offer(-1, nodes, state.costs[nodes], edges, paths, self._propagator.start())
+        edges = [opened.edge(node) for node in nodes]
+        lengths = [opened.cost(node) for node in nodes]
+        paths = [self._path(self._view.start, self._curves[-2 - edge]) for edge in edges]
+        self._offer(-1, nodes, lengths, edges, paths, self._propagator.start())
 
     @property
     def arrived(self) -> bool:
         """True if the cheapest open node lies beyond the line."""
-        state = self._star.state
-        return bool(state.counters[SIZE] and reached(self._built.lattice, state.heap[0]))
+        tree = self._tree
+        return tree.open_count > 0 and self._built.graph.is_goal(tree.next())
 
     def expand(self) -> bool:
         """Predict all edges from the most promising node; False where none is open.
@@ -86,33 +84,31 @@ class PublishedSearch:
             Stopped: if the stop rule fires.
         """
         go_on(self._stopped)
-        lattice = self._built.lattice
         motions = self._built.motions
-        node = int(take(self._star.state))
-        if node < 0:
+        if not self._tree.open_count:
             return False
-        nodes, costs, edges = self._successors
-        count = int(successors(lattice, node, nodes, costs, edges))
+        node = self._tree.take()
+        count = self._built.graph.successors(node, *self._successors)
         ice = self._maps.pop(node)
         if count:
             start = self._pose(node)
-            paths = [self._path(start, motions.pieces[edge]) for edge in edges[:count]]
-            self._offer(node, nodes[:count], costs[:count], edges[:count], paths, ice)
+            nodes, costs, edges = (part[:count].tolist() for part in self._successors)
+            paths = [self._path(start, motions.pieces[edge]) for edge in edges]
+            self._offer(node, nodes, costs, edges, paths, ice)
         return True
 
     def _offer(
         self,
         parent: int,
-        nodes: IntArray,
-        lengths: FloatArray,
-        edges: IntArray,
+        nodes: list[int],
+        lengths: list[float],
+        edges: list[int],
         paths: list[FloatArray],
         ice: Patch,
     ) -> None:
         """Open the ends of edges from a node; what they do to its ice takes one network call."""
-        state = self._star.state
-        lattice = self._built.lattice
-        before = 0.0 if parent < 0 else float(state.costs[parent])
+        tree = self._tree
+        before = 0.0 if parent < 0 else tree.cost(parent)
         made: list[tuple[Patch, float]] = []
         for first in range(0, len(paths), self._propagator.batch):
             go_on(self._stopped)
@@ -121,15 +117,16 @@ class PublishedSearch:
         for node, length, edge, (after, _) in zip(nodes, lengths, edges, made, strict=True):
             change = float(np.square(after - ice).sum()) / PATCH_CELLS**2
             cost = before + self._weight * change + length / self._unit
-            if not state.known[node] or cost < state.costs[node]:
-                self._maps[int(node)] = after
-                offer(state, node, cost, bound_at(lattice, node) / self._unit, parent, edge)
+            if not tree.known(node) or cost < tree.cost(node):
+                self._maps[node] = after
+                bound = self._built.graph.estimate(node) / self._unit
+                tree.offer(node, cost, bound, parent, edge)
 
     def _pose(self, node: int) -> FloatArray:
         """(3,) a node's pose in the frame of the channel."""
         lattice = self._built.lattice
         (row, column, _) = self._built.start
-        h, u, v = place_of(lattice, node)
+        h, u, v = self._built.graph.place_of(node)
         ahead = lattice.step * (u - row)
         left = lattice.step * (v - column)
         return np.array([-left, ahead, self._built.motions.angles[h] + 0.5 * math.pi])
@@ -143,8 +140,7 @@ class PublishedSearch:
     def plan(self) -> Plan:
         """Along the path to the goal; of the floes it predicts nothing but the map."""
         world = self._view.world
-        goal = int(self._star.state.heap[0])
-        arcs = path_arcs(self._built, self._star, self._curves, goal)
+        arcs = path_arcs(self._built, self._tree, self._curves, self._tree.next())
         return timed_path(world, *lay_path(self._built, arcs, world, LATTICE))
 
 

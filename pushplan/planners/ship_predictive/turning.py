@@ -7,8 +7,7 @@ import math
 import numpy as np
 
 from pushplan.planners.ship_predictive.beam_search import SPACING
-from pushplan.planners.ship_predictive.channel_view import ChannelView
-from pushplan.planners.ship_predictive.ice_cost_to_go import STEEPEST
+from pushplan.planners.ship_predictive.channel_view import STEEPEST, ChannelView
 from pushplan.world.checks import FloatArray
 
 

@@ -19,9 +19,10 @@ from pushplan.control import (
     Recovery,
     SimulatedExecutor,
 )
+from pushplan.core import motion as core
 from pushplan.envs import make
 from pushplan.interaction import QuasiStatic
-from pushplan.motion.collision import footprint, obstacles, static_depth
+from pushplan.motion.collision import footprint, obstacles
 from pushplan.planners import make_planner, policy_for
 from pushplan.planners.following.plan_follower import PlanFollower
 from pushplan.planners.following.recovery_timing import RecoveryRule
@@ -183,12 +184,12 @@ def test_a_recovery_ends_where_the_robot_cannot_move_and_where_it_can(seed):
 
 def test_a_recovery_drives_into_no_wall():
     shape, walls = footprint(maze_testbed(0).robot), obstacles(maze_testbed(0).static)
-    scratch = np.empty_like(shape.vertices)
+    checker = core.CollisionChecker(shape, walls)
     rng = np.random.default_rng(0)
     room, tried = maze_testbed(0).static.bounds, 0
     while tried < 40:
         pose = np.array([*rng.uniform(room[:2], room[2:]), rng.uniform(-np.pi, np.pi)])
-        if static_depth(pose, shape, walls, scratch) > 0.0:
+        if checker.depth(pose) > 0.0:
             continue
         tried += 1
         robot = Unicycle(maze_testbed(0, 0).moved(robot_pose=pose), 0.1)
@@ -196,7 +197,7 @@ def test_a_recovery_drives_into_no_wall():
         while (twist := recovery.command(robot.world, 0.1)) is not None:
             robot.drive(twist)
             here = np.array(robot.world.robot_pose)
-            assert static_depth(here, shape, walls, scratch) < 0.01 * shape.radius
+            assert checker.depth(here) < 0.01 * shape.radius
         assert np.abs(robot.world.robot_pose - pose).max() > 0.5 * shape.radius
 
 

@@ -9,10 +9,11 @@ import weakref
 import numpy as np
 import pytest
 
+from pushplan.core import motion as core
 from pushplan.envs.tasks.namo import NamoTask
 from pushplan.evaluation import JobSettings, run_episode
 from pushplan.interaction import QuasiStatic
-from pushplan.motion.collision import first_blocked, footprint, obstacles
+from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.keyholes import KeyholeConfig, KeyholeSearch
 from pushplan.planners import make_planner, make_policy
 from pushplan.planners.namo.movability import Movability
@@ -74,9 +75,9 @@ def dead_end() -> World:
 
 def keeps_from_walls(found: Plan, world: World, margin: float = 0.0) -> bool:
     """Whether the robot, grown by a margin in R, touches no wall on a plan."""
-    shape, poses = footprint(world.robot, margin * world.robot.circumscribed_radius), found.poses
-    scratch = np.empty_like(shape.vertices)
-    return first_blocked(poses, len(poses), shape, obstacles(world.static), scratch) == len(poses)
+    shape = footprint(world.robot, margin * world.robot.circumscribed_radius)
+    checker = core.CollisionChecker(shape, obstacles(world.static))
+    return checker.first_blocked(found.poses) == len(found.poses)
 
 
 @pytest.mark.parametrize("layout", ["one_box", "aside", "order"])

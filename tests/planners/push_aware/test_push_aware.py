@@ -12,20 +12,17 @@ from hypothesis import strategies as st
 from shapely import Polygon
 from shapely.ops import unary_union
 
+from pushplan.core import motion
+from pushplan.core import planners as core
 from pushplan.envs import RolloutInteraction
 from pushplan.geometry import VisibilityGraph
 from pushplan.interaction import QuasiStatic
 from pushplan.motion.collision import footprint, obstacles
-from pushplan.motion.dubins import along_arc, dubins
 from pushplan.motion.goal_region import goal_numbers
 from pushplan.motion.length_bound import length_bound, turning_length
-from pushplan.motion.path_problem import PathProblem
 from pushplan.planners import make_planner, make_policy, policy_names
 from pushplan.planners.push_aware import PushAware, PushAwareConfig
-from pushplan.planners.push_aware.cost_to_go import length_to_go
-from pushplan.planners.push_aware.cost_to_go_maker import CostToGoMaker
-from pushplan.planners.push_aware.push_tree import make_push_tree, plant, trace
-from pushplan.planners.push_aware.random_tree import DRAWS, grow
+from pushplan.planners.push_aware.cost_to_go import CostToGoMaker
 from pushplan.planners.rrt import KinodynamicRRT, KinodynamicRRTConfig
 from pushplan.world import (
     Deadline,
@@ -177,7 +174,7 @@ def test_the_turning_bound_is_below_every_dubins_path(x, y, theta, radius, size)
     for around in np.linspace(0.0, 2.0 * np.pi, 13):
         for heading in np.linspace(-np.pi, np.pi, 13):
             end = [x + 0.999 * size * np.cos(around), y + 0.999 * size * np.sin(around), heading]
-            shortest = min(shortest, dubins(pose, np.array(end), radius, pieces))
+            shortest = min(shortest, motion.dubins(pose, np.array(end), radius, pieces))
     if goal.distance(0.0, 0.0) > 0.0:
         assert bound <= shortest + 1e-9
 
@@ -246,7 +243,7 @@ def test_thin_posts_are_not_missed_where_the_robot_starts_at_a_wall():
         for n, span in enumerate(np.diff(plan.times)):
             for share in (0.0, 0.5):
                 length = plan.speeds[n] * span * share
-                along_arc(poses[n], length, plan.turn_rates[n] / plan.speeds[n], between)
+                motion.along_arc(poses[n], length, plan.turn_rates[n] / plan.speeds[n], between)
                 cut = Polygon(transform(between, diamond)).intersection(hit).area
                 assert cut < 0.2 * 4e-4
     assert solved > 4
@@ -260,7 +257,7 @@ def test_the_random_tree_alone_gets_there_under_a_bound():
         robot_pose=[2, 5, 0],
         goal=GoalDisc([10, 5], 1.0),
     )
-    problem = PathProblem(
+    problem = motion.PathProblem(
         robot_mass=1.0,
         push_weight=2.0,
         turning_radius=0.6,
@@ -270,25 +267,25 @@ def test_the_random_tree_alone_gets_there_under_a_bound():
         goal=goal_numbers(world.goal, 0.0),
         footprint=footprint(world.robot),
         walls=obstacles(world.static),
-        contacts=QuasiStatic().compiled(world),
     )
-    nodes, rng, bound = make_push_tree(20_000, 2, 8.0), generator(0), 14.0
-    plant(nodes, world.robot_pose, world.movables.poses, 0.0)
+    model = QuasiStatic().compiled(world)
+    nodes, rng, bound = core.PushTree(20_000, 2, 8.0), generator(0), 14.0
+    nodes.plant(world.robot_pose, world.movables.poses, 0.0)
     found = []
     for _ in range(150):
-        draws = rng.random((200, DRAWS))
-        at = grow(nodes, draws, bound, 1.5, np.array([1.5, np.pi, 1.5]), problem)
+        draws = rng.random((200, 6))
+        at = core.grow(nodes, draws, bound, 1.5, np.array([1.5, np.pi, 1.5]), problem, model)
         if at == -2:
-            plant(nodes, world.robot_pose, world.movables.poses, 0.0)
+            nodes.plant(world.robot_pose, world.movables.poses, 0.0)
         if at >= 0:
-            assert nodes.costs[at] < bound
+            assert nodes.cost(at) < bound
             pose = world.robot_pose.copy()
-            for length, curvature in trace(nodes, at):
+            for length, curvature in nodes.arcs_to(at):
                 end = np.empty(3)
-                along_arc(pose, length, curvature, end)
+                motion.along_arc(pose, length, curvature, end)
                 pose = end
             assert world.goal.distance(*pose[:2]) <= 1e-9
-            bound = float(nodes.costs[at])
+            bound = nodes.cost(at)
             found.append(bound)
     assert len(found) > 2
     assert found[-1] < 9.5  # 7 at least
@@ -426,7 +423,7 @@ def test_the_table_is_close_to_the_shortest_way():
     graph = VisibilityGraph(world.static, world.robot.inscribed_radius)
     for pose in ([11.25, 3.75, np.pi / 2], [10.0, 9.0, 2.0], [4.0, 9.0, -np.pi / 2]):
         shortest = graph.to_goal(pose[:2], world.goal).length
-        assert 0.999 * shortest < length_to_go(table, *pose) < 1.1 * shortest + 0.3
+        assert 0.999 * shortest < table.length_to_go(*pose) < 1.1 * shortest + 0.3
 
 
 def test_a_map_too_large_for_a_table_is_planned_without():

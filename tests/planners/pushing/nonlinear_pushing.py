@@ -5,28 +5,22 @@ It says how much the quadratic program gives away, and takes a hundred times as 
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import casadi
 import numpy as np
 
-from pushplan.control.mpc.tracking_kernels import errors, locate
-from pushplan.geometry.obstacles import obstacles_of
-from pushplan.planners.pushing.box_motion_kernels import FLUSH, box_pose
-from pushplan.planners.pushing.contact_kernels import Contact
-from pushplan.planners.pushing.cost_kernels import SPEED_SMOOTHNESS, PushingProblem, Weights
-from pushplan.planners.pushing.mpc import PushingMpc
-from pushplan.planners.pushing.problem_kernels import assemble
-from pushplan.planners.pushing.push_kernels import (
-    drive_push,
-    observe_push,
-    problem_now,
-    send_push,
-)
-from pushplan.planners.pushing.push_observer_kernels import VALUE
+from pushplan.control.mpc.horizon import track_of
+from pushplan.core import pushing as core
+from pushplan.geometry.obstacles import core_obstacles
+from pushplan.planners.pushing.mpc import _SAFE_FRACTION, _WEIGHTS, PushingMpc, groups_of
 from pushplan.world import RobotModel, World
 from pushplan.world.checks import FloatArray, IntArray
 
+FLUSH = 1e-9  # angle below which a box counts as lying on the bumper [rad]
+SPEED_SMOOTHNESS = 0.1  # cost of a change of speed, against that of turn rate
+_MOST_OFFSET, _MOST_GAP = 1.5, 2.0  # that the problem is solved for [half bumpers, L]
 _SUBSTEPS = 2
 _ROUNDS = 3  # how often the box's places on the path are looked up again
 _SETTINGS: dict[str, Any] = {
@@ -52,36 +46,32 @@ class NonlinearPushingMpc(PushingMpc):
     gain: tuple[float, float] = (0.0, 0.0)
     """Cost of the quadratic program's commands and of those found at the last call."""
 
-    def _step(self, world: World, pose: FloatArray, box: FloatArray) -> None:
-        memory, held, out = self._memory, self._clock.held, self._out
-        if not observe_push(memory, self._track, pose, box, world.time, held):
-            send_push(memory, 0.0, 0.0, world.time, held, out)
-            return
-        if not self._solve(memory):
-            memory.horizon.nominal[:] = [world.robot.max_speed, 0.0]
-        memory.horizon.nominal[:] = self._refined(world.robot, memory.horizon.nominal.copy())
-        memory.told[VALUE] = self.gain[1]
-        drive_push(memory, obstacles_of(world.static), True, world.time, held, out)
+    def _step(self, world: World, pose: FloatArray, box: FloatArray) -> tuple[float, float]:
+        tracker, nominal, held = self._tracker, self._horizon.nominal, self._clock.held
+        if not tracker.observe(self._track, pose, box, world.time, held):
+            return tracker.send(0.0, 0.0, world.time, held)
+        if not self._solve(tracker):
+            nominal[:] = [world.robot.max_speed, 0.0]
+        nominal[:] = self._refined(world.robot, nominal.copy())
+        return tracker.drive(core_obstacles(world.static), True, world.time, held)
 
     def _refined(self, robot: RobotModel, commands: FloatArray) -> FloatArray:
         """The best of commands (M, 2) and of what IPOPT makes of them."""
-        config, nominal, memory = self.config, commands, self._memory.assembly
-        problem = problem_now(self._memory, self._track, self._clock.held)
-        value = float(assemble(problem, nominal, memory))
+        config, nominal, horizon = self.config, commands, self._horizon
+        problem = Problem(self, robot)
+        value = problem.cost(nominal)
         self.gain = (value, value)
-        horizon, steps = self._memory.horizon, problem.steps
         units, last = horizon.units, horizon.last
         low, high = horizon.program.low, horizon.program.high
         solver, changes = self._nonlinear(problem, robot)
         n, count = 2 * config.moves, 5 * config.horizon
         best = nominal
         for _ in range(_ROUNDS):
-            assemble(problem, nominal, memory)
-            places = self._places(problem, robot, nominal)
-            states = memory.states
+            states = problem.states(nominal)
+            places = self._places(problem, robot, nominal, states)
             found = solver(
                 x0=np.concatenate([(nominal / units).T.ravel(), states[1:, :5].ravel()]),
-                p=np.concatenate([states[0, :5], steps, last / units, places.ravel()]),
+                p=np.concatenate([states[0, :5], problem.steps, last / units, places.ravel()]),
                 lbx=np.concatenate([low[:n], np.full(count, -np.inf)]),
                 ubx=np.concatenate([high[:n], np.full(count, np.inf)]),
                 lbg=np.concatenate([np.zeros(count), low[n : n + changes]]),
@@ -92,58 +82,100 @@ class NonlinearPushingMpc(PushingMpc):
                 break
             z = np.clip(z, low[:n], high[:n])
             nominal = np.ascontiguousarray(z.reshape(2, -1).T * units)
-            cost = float(assemble(problem, nominal, memory))
+            cost = problem.cost(nominal)
             if cost < self.gain[1]:
                 best, self.gain = nominal, (value, cost)
         return best
 
-    def _nonlinear(self, problem: PushingProblem, robot: RobotModel) -> tuple[Any, int]:
+    def _nonlinear(self, problem: Problem, robot: RobotModel) -> tuple[Any, int]:
         """The solver, and its number of constraints on changes of commands."""
-        key = (problem.contact, problem.weights, robot, self.config)
+        key = (self._tracker.face, self._plan, robot, self.config)
         if self._solver_of is None or self._solver_of[0] != key:
             made = nonlinear_problem(
                 problem.contact, problem.weights, robot, problem.groups, self.config.moves
             )
-            changes = len(self._memory.horizon.program.low) - 2 * self.config.moves
+            changes = len(self._horizon.program.low) - 2 * self.config.moves
             self._solver_of = (key, made, changes)
         return self._solver_of[1], self._solver_of[2]
 
     def _places(
-        self, problem: PushingProblem, robot: RobotModel, nominal: FloatArray
+        self, problem: Problem, robot: RobotModel, nominal: FloatArray, states: FloatArray
     ) -> FloatArray:
         """(N, 6) of each step: path x, y, heading, curvature; wanted speed and turn rate."""
-        contact, track, weights, steps = (
-            problem.contact,
-            problem.track,
-            problem.weights,
-            problem.steps,
-        )
-        states, rows, place = self._memory.assembly.states, [], self.along
-        at = _box_of(contact, states[0])
-        _, index, fraction = locate(track, at[0], at[1], place, place)
-        curvature = errors(track, at[0], at[1], states[0, 2], index, fraction)[3]
+        contact, plan, steps = problem.contact, self._plan, problem.steps
+        track, rows, place = track_of(plan), [], self.along
+        at = contact.box_pose(states[0])
+        _, index, fraction = track.locate(at[0], at[1], place, place)
+        curvature = track.errors(at[0], at[1], states[0, 2], index, fraction)[3]
         for k, dt in enumerate(steps.tolist()):
-            wanted = min(float(track.speeds[index]), weights.max_speed)
-            wanted = min(wanted, max(float(track.lengths[-1]) - place, 0.0) / dt)
+            wanted = min(float(plan.speeds[index]), robot.max_speed)
+            wanted = min(wanted, max(float(plan.arc_lengths[-1]) - place, 0.0) / dt)
             turn = min(max(wanted * curvature, -robot.max_turn_rate), robot.max_turn_rate)
             v = float(nominal[problem.groups[k], 0])
-            at = _box_of(contact, states[k + 1])
+            at = contact.box_pose(states[k + 1])
             theta = states[k + 1, 2] + states[k + 1, 4]
-            place, index, fraction = locate(track, at[0], at[1], place, place + 2.0 * v * dt + 1e-9)
-            lateral, _, heading, curvature = errors(track, at[0], at[1], theta, index, fraction)
+            place, index, fraction = track.locate(at[0], at[1], place, place + 2.0 * v * dt + 1e-9)
+            lateral, _, heading, curvature = track.errors(at[0], at[1], theta, index, fraction)
             foot = [at[0] + lateral * np.sin(heading), at[1] - lateral * np.cos(heading)]
             rows.append([*foot, heading, curvature, wanted, turn])
         return np.array(rows)
 
 
-def _box_of(contact: Contact, state: FloatArray) -> tuple[float, float]:
-    out = np.empty(3)
-    box_pose(contact, state, out)
-    return float(out[0]), float(out[1])
+class Problem:
+    """The problem of the present call, put up from what the tracker tells."""
+
+    def __init__(self, mpc: PushingMpc, robot: RobotModel) -> None:
+        config, horizon, tracker = mpc.config, mpc._horizon, mpc._tracker
+        model = mpc.model
+        self.contact, self.steps = model.contact, horizon.steps
+        self.groups = groups_of(config.horizon, config.moves)
+        curvature = config.margin * model.stable_curvature()
+        limited = model.stable_curvature() * model.reach > 0.02
+        self.weights = SimpleNamespace(
+            length=model.reach,
+            max_speed=robot.max_speed,
+            half=model.bumper.half,
+            curvature=curvature if limited else -1.0,
+            safe=_SAFE_FRACTION,
+            **{name: getattr(config, name) for name in _WEIGHTS},
+        )
+        self._start = tracker.state_in_effect
+        far = _MOST_OFFSET * model.bumper.half
+        self._start[3] = min(max(self._start[3], -far), far)
+        self._start[5] = min(self._start[5], _MOST_GAP * model.reach)
+        self._core = core.PushingProblem(
+            self.contact,
+            mpc._track,
+            core.PushWeights(**vars(self.weights)),
+            self._start,
+            mpc.along,
+            horizon.last,
+            horizon.units,
+            horizon.steps,
+            self.groups,
+        )
+        self._assembly = core.PushAssembly(config.horizon, config.moves)
+
+    def cost(self, nominal: FloatArray) -> float:
+        """Of commands (M, 2)."""
+        n = nominal.size
+        return self._assembly.assemble(self._core, nominal, np.empty((n, n)), np.empty(n))
+
+    def states(self, nominal: FloatArray) -> FloatArray:
+        """(N + 1, 6) under commands (M, 2)."""
+        count = len(self.steps)
+        states, motions = np.empty((count + 1, 6)), np.empty((count, 6))
+        twists = nominal[self.groups]
+        self.contact.roll_out(self._start, twists, self.steps, states, motions)
+        return states
 
 
 def nonlinear_problem(
-    contact: Contact, weights: Weights, robot: RobotModel, groups: IntArray, moves: int
+    contact: core.BoxContact,
+    weights: SimpleNamespace,
+    robot: RobotModel,
+    groups: IntArray,
+    moves: int,
 ) -> Any:
     """The problem of `assemble` with its states as variables, for CasADi's IPOPT."""
     count = len(groups)
@@ -186,7 +218,9 @@ def nonlinear_problem(
     return casadi.nlpsol("push", "ipopt", problem, _SETTINGS)
 
 
-def _step_cost(contact: Contact, weights: Weights, x: Any, place: Any, v: Any, w: Any) -> Any:
+def _step_cost(
+    contact: core.BoxContact, weights: SimpleNamespace, x: Any, place: Any, v: Any, w: Any
+) -> Any:
     """Squares of the residuals of one step, see `residuals`."""
     ahead = _standoff(contact, x[3], x[4])[0]
     c, s = casadi.cos(x[2]), casadi.sin(x[2])
@@ -208,7 +242,9 @@ def _step_cost(contact: Contact, weights: Weights, x: Any, place: Any, v: Any, w
     return cost
 
 
-def step(contact: Contact, x: Any, v: Any, w: Any, dt: Any, substeps: int = _SUBSTEPS) -> Any:
+def step(
+    contact: core.BoxContact, x: Any, v: Any, w: Any, dt: Any, substeps: int = _SUBSTEPS
+) -> Any:
     """`advance` of a box in contact, as an expression: (5,) state after ``dt``."""
     h = dt / substeps
     for _ in range(substeps):
@@ -235,12 +271,12 @@ def step(contact: Contact, x: Any, v: Any, w: Any, dt: Any, substeps: int = _SUB
     return x
 
 
-def _line(contact: Contact, offset: Any) -> tuple[Any, Any]:
+def _line(contact: core.BoxContact, offset: Any) -> tuple[Any, Any]:
     low = casadi.fmax(contact.low, -contact.half - offset)
     return low, casadi.fmin(contact.high, contact.half - offset)
 
 
-def _flush(contact: Contact, offset: Any) -> Any:
+def _flush(contact: core.BoxContact, offset: Any) -> Any:
     if contact.curvature <= 0.0:
         return 0.0
     low, high = _line(contact, offset)
@@ -251,7 +287,7 @@ def _flush(contact: Contact, offset: Any) -> Any:
     )
 
 
-def _standoff(contact: Contact, offset: Any, angle: Any) -> tuple[Any, Any]:
+def _standoff(contact: core.BoxContact, offset: Any, angle: Any) -> tuple[Any, Any]:
     c, s = casadi.cos(angle), casadi.sin(angle)
     low, high = _line(contact, offset)
     middle = 0.5 * (low + high)
@@ -271,7 +307,9 @@ def _standoff(contact: Contact, offset: Any, angle: Any) -> tuple[Any, Any]:
     return best, at
 
 
-def _corner(contact: Contact, y: Any, tilt: Any, un: Any, ut: Any, w: Any) -> tuple[Any, Any, Any]:
+def _corner(
+    contact: core.BoxContact, y: Any, tilt: Any, un: Any, ut: Any, w: Any
+) -> tuple[Any, Any, Any]:
     px, square = -contact.depth, contact.spread**2
     cn, ct = un - w * y, ut + w * px
     total = square + px**2 + y**2
@@ -296,9 +334,9 @@ def _corner(contact: Contact, y: Any, tilt: Any, un: Any, ut: Any, w: Any) -> tu
 
 
 def _velocity(
-    contact: Contact, offset: Any, angle: Any, v: Any, w: Any, dt: Any
+    contact: core.BoxContact, offset: Any, angle: Any, v: Any, w: Any, dt: Any
 ) -> tuple[Any, Any, Any]:
-    """`contact_kernels.contact_velocity` as expressions."""
+    """`BoxContact.velocity` as expressions."""
     ahead, touch = _standoff(contact, offset, angle)
     c, s = casadi.cos(angle), casadi.sin(angle)
     ux, uy = v - w * offset, w * ahead

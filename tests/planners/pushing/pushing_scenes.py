@@ -11,7 +11,7 @@ from pushplan.envs.registry import SIMULATORS
 from pushplan.envs.simulators.base import Materials, Simulator
 from pushplan.envs.tasks.presets import SOLIDS
 from pushplan.imports.on_demand import look_up
-from pushplan.planners.pushing import PushModel, PushPath, PushState, box_motion_kernels
+from pushplan.planners.pushing import PushModel, PushPath, PushState
 from pushplan.world import Episode, Movables, Receptacle, RobotModel, StaticMap, Twist, World
 
 SQUARE = 0.5 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
@@ -57,7 +57,7 @@ def best_offset(model: PushModel, path: PushPath, speed: float) -> float:
     The middle of the range that it slides over lies on the middle of the bumper; of a path that
     needs too much of it only the beginning counts.
     """
-    state, out = np.zeros(6), np.zeros(6)
+    state = np.zeros(6)
     low = high = 0.0
     half = model.bumper.half
     lengths = path.lengths
@@ -66,9 +66,8 @@ def best_offset(model: PushModel, path: PushPath, speed: float) -> float:
         if length < 1e-9:
             continue
         turn = math.remainder(float(path.poses[i, 2] - path.poses[i - 1, 2]), math.tau)
-        box_motion_kernels.advance(
-            model.contact, state, speed, turn * speed / length, length / speed, out
-        )
+        command = [[speed, turn * speed / length]]
+        state = model.rows(PushState.from_row(state), command, length / speed)[0][1]
         if max(high, state[3]) - min(low, state[3]) > 1.2 * half:
             break
         low, high = min(low, float(state[3])), max(high, float(state[3]))

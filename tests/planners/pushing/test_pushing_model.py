@@ -14,11 +14,8 @@ from pushplan.planners.pushing import (
     PushModel,
     PushParameters,
     PushState,
-    box_motion_kernels,
-    contact_kernels,
     face_towards,
     pressure_radius,
-    problem_kernels,
     spread_of,
     stable_curvature,
 )
@@ -32,6 +29,7 @@ from pushplan.world import (
     turtlebot3_burger,
 )
 
+FREE, STICK, SLIDE, CORNER_STICK, CORNER_SLIDE = range(5)
 PLANAR = spread_of("inertia", SQUARE)
 AREA = area_clearing_robot()
 PUSHER = turtlebot3_burger("pusher", max_speed=0.2, max_turn_rate=0.785)
@@ -184,22 +182,20 @@ def test_forces_obey_coulomb_and_the_limit_surface(robot, friction, offset, angl
     contact = model.contact
     v, w = 0.2, 0.2 * 1.5 * bend / model.reach
     out = np.empty(6)
-    contact_kernels.contact_velocity(
-        contact, s, phi, np.cos(phi), np.sin(phi), v, w, 0.1 * model.reach / v, out
-    )
+    contact.velocity(s, phi, np.cos(phi), np.sin(phi), v, w, 0.1 * model.reach / v, out)
     vn, vt, omega, y, mode, shear = out
-    low, high = contact_kernels.line(contact, s)
+    low, high = contact.line(s)
     assert vn >= -1e-9 and low - 1e-9 <= y <= high + 1e-9
     assert abs(shear) <= friction + 1e-9
     # the force that the limit surface asks for acts at the centre of pressure
     torque = contact.spread**2 * omega
     assert torque == pytest.approx(-contact.depth * vt - y * vn, abs=1e-9)
-    if mode in (contact_kernels.SLIDE, contact_kernels.CORNER_SLIDE):
+    if mode in (SLIDE, CORNER_SLIDE):
         assert abs(shear) == pytest.approx(friction, abs=1e-9)
-    if contact.curvature == 0.0 and mode in (contact_kernels.STICK, contact_kernels.SLIDE):
-        x = contact_kernels.standoff(contact, s, phi)[0]
+    if contact.curvature == 0.0 and mode in (STICK, SLIDE):
+        x = contact.standoff(s, phi)[0]
         ut = math.cos(phi) * w * x - math.sin(phi) * (v - w * s)
-        if mode == contact_kernels.STICK:
+        if mode == STICK:
             assert vt == pytest.approx(ut, abs=1e-9)
         else:  # friction drags the box after the bumper
             assert shear * (ut - vt) >= -1e-9
@@ -236,7 +232,7 @@ def test_a_box_that_is_not_touched_stands():
     boxes = [model.box_pose(PushState.from_row(row)) for row in away]
     assert np.array(boxes) == pytest.approx(np.tile(box, (4, 1)), abs=1e-9)
     towards, details = model.rows(state, np.tile([0.2, 0.0], (20, 1)), 0.2)
-    assert details[0, 4] == contact_kernels.FREE and details[-1, 4] == contact_kernels.STICK
+    assert details[0, 4] == FREE and details[-1, 4] == STICK
     assert model.box_pose(PushState.from_row(towards[-1]))[0] - box[0] == pytest.approx(
         0.8 - 0.5, abs=0.08
     )
@@ -244,7 +240,7 @@ def test_a_box_that_is_not_touched_stands():
     assert model.state(np.zeros(3), box).offset == pytest.approx(0.2)
 
 
-def test_nonlinear_expressions_are_those_of_the_kernels():
+def test_nonlinear_expressions_are_those_of_the_core():
     rng = np.random.default_rng(0)
     for kind in ("pusher", "collector", "navigation"):
         model = PushModel(turtlebot3_burger(kind), 0.08 * SQUARE, PushParameters(0.3))
@@ -257,9 +253,7 @@ def test_nonlinear_expressions_are_those_of_the_kernels():
             v, w = 0.2, rng.uniform(-1.0, 1.0)
             found = np.asarray(made(row[:5], [v, w, 0.1])).ravel()
             for _ in range(2):
-                c, s = math.cos(row[4]), math.sin(row[4])
-                box_motion_kernels._push(model.contact, row, c, s, v, w, 0.05, np.empty(6))
-                box_motion_kernels._drive(row, v, w, 0.05)
+                row = model.rows(PushState.from_row(row), [[v, w]], 0.05)[0][1]
             assert found == pytest.approx(row[:5], abs=1e-9)
 
 
@@ -276,7 +270,7 @@ def test_derivatives_of_the_program_are_those_of_the_reference(kind):
     for _ in range(60):
         point = np.array([0.06, 0.3, 0.05, 1.0]) * rng.uniform(-1.0, 1.0, 4)
         point[2] += 0.15
-        problem_kernels.linearise(model.contact, *point, dt, scales, slopes, np.empty(12))
+        model.contact.linearise(*point, dt, scales, slopes)
         assert slopes == pytest.approx(exact(point).full(), abs=1e-4)
 
 

@@ -17,7 +17,6 @@ from pushplan.planners.pushing import (
     PushModel,
     PushParameters,
     PushPath,
-    warm_up,
 )
 from pushplan.planners.pushing.mpc import groups_of
 from pushplan.world import (
@@ -196,7 +195,7 @@ def test_when_the_solver_fails_the_last_solution_is_driven_on():
     mpc, plan = PushingMpc(config), path.plan(AREA, 0)
     first = mpc.command(world, plan)
     assert first.linear > 0.5 * AREA.max_speed
-    mpc._solver = ProgramSolver(mpc._memory.horizon.program, 1e-300, 1)
+    mpc._solver = ProgramSolver(mpc._horizon.program, 1e-300, 1)
     later = [mpc.command(world.moved(time=0.2 * (i + 1)), plan) for i in range(30)]
     assert later[0].linear > 0.0 and later[-1] == Twist(0.0, 0.0)
     assert mpc.fallbacks == 30
@@ -212,7 +211,6 @@ def test_steps_are_shared_out_among_commands():
 
 
 def test_it_is_quick():
-    warm_up()
     config = PushingConfig(period=0.2)
     path, length = shaped(AREA, 1.0, S_SHAPE)
     world = make_world(AREA, [-1.01 * length, 0.0, 0.0], [[0.0, 0.0, 0.0]])

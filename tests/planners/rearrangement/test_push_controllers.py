@@ -6,10 +6,8 @@ from dataclasses import replace
 import numpy as np
 from conftest import make_boxes
 
-from pushplan.interaction.kernels import sweep_path
 from pushplan.planners.pushing import PushPath
 from pushplan.planners.rearrangement import PushScene, RearrangementConfig
-from pushplan.planners.rearrangement.goal_kernels import all_done
 from pushplan.planners.rearrangement.push_controllers import GeometricPusher
 from pushplan.planners.rearrangement.push_simulator import PushAttempt, simulate
 from pushplan.planners.rearrangement.push_starts import initial_heading
@@ -30,7 +28,7 @@ def driven(scene, push, controller, plan):
     """The robot's poses until the box is done, in the model of the prediction; the last world."""
     world, robots = scene.world.moved(robot_pose=push.start), [push.start]
     poses, out = np.array(world.movables.poses), np.empty((2, 1, 3))
-    while not all_done(poses, scene.bodies, scene.object_goal).all():
+    while not scene.are_done(poses).all():
         assert len(robots) < 4000
         twist = controller.command(world.moved(time=len(robots) * PERIOD), plan)
         assert controller.command(world.moved(time=len(robots) * PERIOD), plan) == twist
@@ -39,7 +37,7 @@ def driven(scene, push, controller, plan):
         move = twist.linear * PERIOD * np.array([math.cos(middle), math.sin(middle)])
         robots.append(np.array([*(pose[:2] + move), pose[2] + turn]))
         path = np.array(robots[-2:])
-        assert sweep_path(path, poses, scene.bodies, scene.settings, out) < 0
+        assert scene.contacts().sweep(path, poses, out) < 0
         poses = out[-1].copy()
         world = world.moved(robot_pose=robots[-1], movable_poses=poses)
     return np.array(robots), world
@@ -57,7 +55,7 @@ def test_the_geometric_pusher_does_what_was_predicted():
     path = np.array([(-1.0, 0.5), (1.0, 0.5), (4.0, 4.0)])
     start = scene.starts.behind(0, initial_heading(path, 0.5 * scene.size), 0.0)
     [push] = simulate(scene, PushAttempt(start, 0, scene.longest, path))
-    controller = GeometricPusher(scene.controller._replace(gain=push.gain), push.shift)
+    controller = GeometricPusher(scene.controller.with_gain(push.gain), push.shift)
     assert isinstance(controller, Controller)
     plan = PushPath.through(path).plan(world.robot, push.target)
     robots, last = driven(scene, push, controller, plan)

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from conftest import make_u_maze
 
+from pushplan.core import rearrangement as core
 from pushplan.envs import make
 from pushplan.planners import make_policy
 from pushplan.planners.rearrangement import GtspMpc
-from pushplan.planners.rearrangement.goal_kernels import REMOVED
 from pushplan.planners.rearrangement.push import Push, push_plan
 from pushplan.scenarios import suite
 from pushplan.world import InvalidInputError, ShowsPlan, World
@@ -54,7 +54,7 @@ def test_gtsp_mpc_shows_the_push_in_hand() -> None:
 def test_an_object_that_leaves_ends_in_front_of_the_robot() -> None:
     world = make_u_maze([[4.0, 9.0, 0.3], [10.0, 13.0, 0.0]])
     ends = np.array(world.movables.poses)
-    ends[0, 0] = REMOVED
+    ends[0, 0] = core.REMOVED
     path = np.column_stack([np.linspace(3.0, 8.0, 11), np.full(11, 9.0), np.zeros(11)])
     box = int(world.movables.ids[0])
     push = Push((box,), box, "line", path, length=5.0, work=1.0, cost=5.0, object_poses=ends)

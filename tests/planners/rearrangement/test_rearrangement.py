@@ -10,8 +10,8 @@ import pytest
 import shapely
 from conftest import SQUARE, make_boxes
 
-from pushplan.compiled import owned
 from pushplan.control import PoseFollower
+from pushplan.core import rearrangement as core
 from pushplan.gtsp import solve_gtsp
 from pushplan.motion.recovery_path import recovery_path
 from pushplan.planners.rearrangement import (
@@ -22,16 +22,7 @@ from pushplan.planners.rearrangement import (
 )
 from pushplan.planners.rearrangement.approach import approach_tree
 from pushplan.planners.rearrangement.candidates import partial_pushes
-from pushplan.planners.rearrangement.cost_to_go_kernels import cost_to_go
-from pushplan.planners.rearrangement.goal_kernels import all_done
-from pushplan.planners.rearrangement.pose_grid_kernels import (
-    LENGTHS,
-    MOVES,
-    TURNS,
-    add_layers,
-    near_poses,
-)
-from pushplan.planners.rearrangement.pose_search_kernels import PoseSearchProblem, search_poses
+from pushplan.planners.rearrangement.object_paths import LENGTHS, MOVES
 from pushplan.planners.rearrangement.push import signature
 from pushplan.planners.rearrangement.push_choice import select_push
 from pushplan.planners.rearrangement.push_graph import (
@@ -135,7 +126,7 @@ def test_costs_are_no_less_than_the_straight_ways(kind):
 def test_what_a_push_delivers_is_done_where_it_is_predicted_to_end(kind):
     here, graph = example(kind)
     for push in graph.pushes:
-        done = all_done(push.object_poses, here.bodies, here.object_goal)
+        done = here.are_done(push.object_poses)
         assert done[list(push.delivers)].all()
 
 
@@ -184,7 +175,7 @@ def test_set_covering_is_solved_as_by_brute_force():
         costs[:, rng.random(count) < 0.15] = np.inf
         np.fill_diagonal(costs[:-1], np.inf)
         truth = brute_force(costs, masks.tolist(), boxes)
-        best, _ = cost_to_go(costs, masks, boxes)
+        best, _ = core.cost_to_go(costs, masks, boxes)
         assert best[0, count] == pytest.approx(truth)
         reduced = reduce_to_gtsp(costs, masks.tolist(), boxes)
         if not all(reduced.clusters):
@@ -474,17 +465,18 @@ def test_what_is_remembered_comes_to_the_same():
 def test_the_search_is_that_of_dijkstra():
     here, _ = example("clearing")
     grid, layers = here.coarse
-    depths, touch = add_layers(layers, here.contact_weights)
-    starts, costs = near_poses(grid, owned(here.world.robot_pose), 1.5)
-    none = np.zeros(0, dtype=np.int64)
-    problem = PoseSearchProblem(starts, costs, grid, depths, touch, 0.02, 0.5, none)
-    best, before = search_poses(problem)
+    depths, touch = core.add_layers(layers, here.contact_weights)
+    problem = (*grid.near_poses(here.world.robot_pose, 1.5), depths, touch, 0.02, 0.5)
+    best, before = grid.search(*problem, np.zeros(0, dtype=np.int64))
     assert np.isfinite(best).mean() > 0.3
     targets = np.argsort(best)[:50]
-    some, _ = search_poses(problem._replace(targets=targets))
+    some, _ = grid.search(*problem, targets)
     assert (some[targets] == best[targets]).all()
     # every cost is that of the pose before it and the step from there, and no step is cheaper
     count, rows, cols = depths.shape
+    headings = np.arctan2(MOVES[:, 1], MOVES[:, 0])
+    steps = np.roll(headings, -1) - headings
+    turns = np.abs(np.arctan2(np.sin(steps), np.cos(steps)))
     flat, near, shut = depths.ravel(), touch.ravel(), grid.blocked.ravel()
     for node in np.flatnonzero(np.isfinite(best))[::37].tolist():
         t, i, j = node // (rows * cols), node // cols % rows, node % cols
@@ -496,8 +488,8 @@ def test_the_search_is_that_of_dijkstra():
                 if not grid.blocked_moves[0, t, *at]:
                     steps.append(((t * rows + y) * cols + x, length, length))
         for to, turn, first in (
-            ((t + 1) % count, TURNS[t], t),
-            (t - 1, TURNS[t - 1], t - 1),
+            ((t + 1) % count, turns[t], t),
+            (t - 1, turns[t - 1], t - 1),
         ):
             if not grid.blocked_moves[1, first, i, j]:
                 steps.append(((to % count * rows + i) * cols + j, 0.02 * turn, 0.5 * turn))

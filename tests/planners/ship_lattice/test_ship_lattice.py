@@ -8,7 +8,6 @@ from shapely.ops import unary_union
 
 from pushplan.planners import make_planner, make_policy
 from pushplan.planners.ship_lattice import ShipLattice, ShipLatticeConfig
-from pushplan.search.astar import AStar
 from pushplan.world import (
     ClearanceArea,
     Deadline,
@@ -288,13 +287,6 @@ def test_deadline_is_kept() -> None:
     planner.plan(world)
     late = [planner.plan(world, stop=Deadline(0.03)).stats.wall_time_s for _ in range(10)]
     assert min(late) < 0.06
-
-
-def test_a_lattice_needs_no_lattice_type() -> None:
-    with pytest.raises(Exception, match=r"successors|is_goal|No implementation"):
-        star = AStar((1, 2), 3, 1)
-        star.start(0)
-        star.run(1)
 
 
 @pytest.mark.parametrize(

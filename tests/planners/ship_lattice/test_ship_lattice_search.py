@@ -12,6 +12,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 from test_ship_lattice import ship_world
 
+from pushplan.core import search
 from pushplan.interaction.ice_interaction import IceInteraction
 from pushplan.interaction.path_sweepers import path_sweeper
 from pushplan.motion.speed_profile import turning_radius
@@ -19,10 +20,8 @@ from pushplan.motion.state_lattice.built_lattice import BuiltLattice
 from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
 from pushplan.motion.state_lattice.lattice_search import open_search
 from pushplan.motion.state_lattice.place_costs import HullWindow, place_costs
-from pushplan.motion.state_lattice.pose_lattice import PoseLattice, bound_at, reached, successors
 from pushplan.planners.ship_lattice import ShipLattice, ShipLatticeConfig
 from pushplan.planners.ship_lattice.floe_costs import floe_costs
-from pushplan.search.astar import FOUND
 from pushplan.world import GoalLine, World
 
 EXACT = {"heuristic": "bound", "inflation": 1.0}
@@ -37,15 +36,15 @@ def builder_of(world: World, config: ShipLatticeConfig) -> LatticeBuilder:
 
 def costs_to_go(built: BuiltLattice) -> np.ndarray:
     """(N,) least cost from every node to the goal, by Dijkstra on the explicit graph."""
-    lattice: PoseLattice = built.lattice
+    lattice = built.graph
     nodes, costs, edges = np.empty(64, np.int64), np.empty(64), np.empty(64, np.int64)
     tails, heads, weights = [], [], []
     goals = []
     for node in range(built.size):
-        if reached(lattice, node):
+        if lattice.is_goal(node):
             goals.append(node)
             continue
-        count = successors(lattice, node, nodes, costs, edges)
+        count = lattice.successors(node, nodes, costs, edges)
         tails += [node] * count
         heads += nodes[:count].tolist()
         weights += costs[:count].tolist()
@@ -73,7 +72,7 @@ def test_the_bound_is_never_above_the_least_cost(seed: int, price: str) -> None:
     config = ShipLatticeConfig(headings=8, floe_cost=price, collision_weight=3.0, **EXACT)
     built = builder_of(small_world(seed), config).build()
     exact = costs_to_go(built)
-    bounds = np.array([bound_at(built.lattice, node) for node in range(built.size)])
+    bounds = np.array([built.graph.estimate(node) for node in range(built.size)])
     finite = np.isfinite(exact)
     assert finite.sum() > 500
     assert (bounds[finite] <= exact[finite] + 1e-9).all()
@@ -93,10 +92,10 @@ def test_a_star_finds_the_cost_of_exhaustive_dijkstra(seed: int) -> None:
     )
     built = BuiltLattice(lattice, built.frame, built.motions, built.start, built.arrives)
     star, curves = open_search(built, builder)
-    starts = np.flatnonzero(star.state.known)
+    starts = star.tree.open_nodes
     exact = costs_to_go(built)
-    least = min(star.state.costs[node] + exact[node] for node in starts)
-    assert curves and star.run(10**7) == FOUND
+    least = min(star.tree.cost(node) + exact[node] for node in starts)
+    assert curves and star.run(10**7) == search.SearchStatus.FOUND
     assert star.cost == pytest.approx(least, rel=1e-12)
 
 
@@ -113,9 +112,12 @@ def test_the_bound_saves_nodes_and_no_cost(seed: int) -> None:
         built.arrives,
     )
     exhaustive, _ = open_search(blind, builder)
-    assert star.run(10**7) == FOUND and exhaustive.run(10**7) == FOUND
+    assert (
+        star.run(10**7) == search.SearchStatus.FOUND
+        and exhaustive.run(10**7) == search.SearchStatus.FOUND
+    )
     assert star.cost == pytest.approx(exhaustive.cost, rel=1e-12)
-    assert star.expanded < 0.5 * exhaustive.expanded
+    assert star.tree.expanded < 0.5 * exhaustive.tree.expanded
 
 
 @pytest.mark.parametrize("inflation", [1.0, 1.5, 3.0])
@@ -159,7 +161,8 @@ def test_the_bound_holds_for_random_walks_over_random_prices(
     rng = np.random.default_rng(seed)
     rows, columns, cell = 30, 20, 0.5
     grid = rng.exponential(1.0, (rows, columns)) * (rng.random((rows, columns)) < 0.4)
-    sums = np.concatenate([np.zeros((columns, 1)), np.cumsum(grid.T, axis=1)], axis=1)
+    sums = np.zeros((columns, rows + 1))
+    sums[:, 1:] = np.cumsum(grid.T, axis=1)
     window = HullWindow(half, reach, 0, 1, 1.0, cell, 0.3)
     places, across = np.array([2, 6, 10]), np.arange(4, 16)
     bounds = place_costs(sums, places, 25, across, (4, 15), window)

@@ -48,10 +48,10 @@ class IceInteraction {
 /// Any other model, behind a function.
 class CalledInteraction {
  public:
-  /// As `advance` of a model, over arrays of as many objects as there are radii. Where it returns
-  /// false, it has changed neither of them.
-  using Advance = bool (*)(void* context, const Pose* from, const Pose* to, Pose* poses,
-                           double* lengths);
+  /// As `advance` of a model, over arrays of `count` objects. Where it returns false, it has changed
+  /// neither of them.
+  using Advance = bool (*)(void* context, Index count, const Pose* from, const Pose* to,
+                           Pose* poses, double* lengths);
 
   CalledInteraction(Advance advance, void* context, std::span<const double> radii,
                     std::span<const double> inverse_masses)
@@ -60,7 +60,8 @@ class CalledInteraction {
   bool advance(const Pose& from, const Pose& to, std::span<Pose> poses,
                std::span<double> lengths) {
     ++tests_;
-    return advance_(context_, &from, &to, poses.data(), lengths.data());
+    return advance_(context_, static_cast<Index>(poses.size()), &from, &to, poses.data(),
+                    lengths.data());
   }
 
   std::span<const double> radii() const { return radii_; }
