@@ -11,7 +11,7 @@ import pytest
 
 from pushplan.interaction import QuasiStatic
 from pushplan.planners.arguments import check_pusher
-from pushplan.planners.warm_up_worlds import warm_up_worlds
+from pushplan.world import Movables, Receptacle, StaticMap, World, area_clearing_robot
 
 ROOT = Path(__file__).parents[1]
 BENCHMARKS = ROOT / "benchmarks"
@@ -56,7 +56,14 @@ def test_the_pages_of_the_index_name_the_command() -> None:
 def test_a_call_path_stays_in_the_files_whose_functions_get_the_world() -> None:
     from benchmarks.accuracy.call_path import CallPath
 
-    (world,) = warm_up_worlds("pushing")
+    square = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]
+    world = World(
+        robot=area_clearing_robot(),
+        robot_pose=(-1.25, 0.0, 0.0),
+        static=StaticMap.build(bounds=(-9.0, -9.0, 9.0, 9.0)),
+        movables=Movables.from_outlines([square], [(0.0, 0.0, 0.2)]),
+        goal=Receptacle([(4.5, 4.5), (5.5, 4.5), (5.5, 5.5), (4.5, 5.5)]),
+    )
     path = CallPath()
     sys.setprofile(path)
     for _ in range(2):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 
 import numpy as np
@@ -10,11 +9,10 @@ import numpy as np
 from pushplan.control.limits import clamp_twist
 from pushplan.control.pose_follower import PoseFollower
 from pushplan.control.progress_checker import StallChecker
-from pushplan.core import motion
-from pushplan.geometry.transforms import arc_step
+from pushplan.core import geometry, motion
 from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.recovery_path import recovery_path
-from pushplan.world import Drive, GoalDisc, Movables, StaticMap, Twist, World, box_delivery_robot
+from pushplan.world import Drive, Twist, World
 from pushplan.world.checks import FloatArray
 
 _WAYS = ((-1.0, 0.0), (-0.5, 1.0), (-0.5, -1.0), (1.0, 0.0), (0.5, 1.0), (0.5, -1.0))
@@ -129,29 +127,12 @@ class Recovery:
         """Return True if a motion leads deeper into static obstacles than the robot is."""
         size = self._radius
         here = np.array(pose)
-        there = np.empty(3)
         x_min, y_min, x_max, y_max = self._bounds
         seconds = _LOOK * size / (abs(way.linear) + size * abs(way.angular))
         allowed = self._walls.depth(here) + _DEEPER * size
         for part in np.linspace(0.0, seconds, _POSES + 1)[1:]:
-            arc_step(here, way.linear * part, way.angular * part, there)
+            there = np.array(geometry.arc_step(here, way.linear * part, way.angular * part))
             inside = x_min <= there[0] <= x_max and y_min <= there[1] <= y_max
             if not inside or self._walls.depth(there) > allowed:
                 return True
         return False
-
-
-@functools.cache
-def warm_up_recovery() -> None:
-    """Load the kernels of a recovery: that of a robot between two columns, with no room to turn."""
-    square = np.array([[0.1, 0.1], [-0.1, 0.1], [-0.1, -0.1], [0.1, -0.1]])
-    columns = [square + np.array([-2.2, y]) for y in (-2.7, -1.3)]
-    world = World(
-        robot=box_delivery_robot(),
-        robot_pose=np.array([-2.2, -2.0, 0.0]),
-        static=StaticMap.build(polygons=columns, bounds=(-3.0, -3.0, 3.0, 3.0)),
-        movables=Movables.from_outlines([2.2 * square], [(-2.2, -0.985, 0.0)]),
-        goal=GoalDisc(np.zeros(2), 0.5),
-    )
-    Recovery(world, world.robot.circumscribed_radius).command(world, 0.1)
-    recovery_path(world, 0.0)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from pushplan.control.limits import ramp_twist
-from pushplan.geometry.transforms import arc_step
+from pushplan.core import geometry
 from pushplan.world import RobotModel, Twist
 from pushplan.world.checks import FloatArray
 
@@ -27,9 +27,7 @@ def add_arc(poses: list[FloatArray], length: float, turn: float, size: float) ->
     """
     steps = math.ceil(max(abs(length) / (_STEP * size), abs(turn) / _STEP))
     for _ in range(steps):
-        there = np.empty(3)
-        arc_step(poses[-1], length / steps, turn / steps, there)
-        poses.append(there)
+        poses.append(np.array(geometry.arc_step(poses[-1], length / steps, turn / steps)))
 
 
 def stopping_path(

@@ -10,7 +10,6 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from pushplan.control import waiting_twist
-from pushplan.control.recovery import warm_up_recovery
 from pushplan.motion.path_search_config import PathSearchConfig
 from pushplan.planners.following.plan_follower import PlanFollower
 from pushplan.planners.registry import make_policy, policy_names
@@ -62,7 +61,6 @@ def warm_up_policy(policy: Policy) -> None:
     if isinstance(policy, WarmsUp):
         policy.warm_up()
     elif isinstance(policy, PlanFollower):
-        warm_up_recovery()
         stop = policy.stop
         for world in warm_up_worlds("followers"):
             with contextlib.suppress(Exception):  # it may be made for other worlds than these

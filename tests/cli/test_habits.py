@@ -189,11 +189,11 @@ def test_at_most_three_near_names(count: int) -> None:
 
 def test_kernels_that_a_worker_compiles_are_told_of() -> None:
     fcntl = pytest.importorskip("fcntl")
-    from pushplan.planners.shortest_path import ShortestPath  # noqa: F401
+    from pushplan.planners.ship_lattice import ShipLattice  # noqa: F401
 
-    pending = PendingKernels("straight", "somebody-elses.py:Policy")
+    pending = PendingKernels("ship-lattice", "somebody-elses.py:Policy")
     assert str(pending) == ""
-    module, _, name = min(expected_kernels("straight")).rpartition(".")
+    module, _, name = min(expected_kernels("ship-lattice")).rpartition(".")
     cache = getattr(importlib.import_module(module), name).cache
     path = Path(cache.cache_path) / f"{cache._stem}.lock"
     with path.open("a") as lock:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pushplan.control import Progress, waiting_twist
-from pushplan.geometry.transforms import arc_step
+from pushplan.core import geometry
 from pushplan.interaction import InteractionModel
 from pushplan.planners.following.replanning import poses_at
 from pushplan.world import Plan, World
@@ -119,9 +119,10 @@ def _stretch(
     speed = abs(waits.linear)
     steps = math.ceil(left * speed / (_SPACING * robot.circumscribed_radius)) or 1
     share = np.arange(steps + 1)[:, None] / steps
-    arc = np.empty((steps + 1, 3))
-    for pose, part in zip(arc, left * share[:, 0], strict=True):
-        arc_step(last, waits.linear * part, waits.angular * part, pose)
+    parts = left * share[:, 0]
+    arc = np.array(
+        [geometry.arc_step(last, waits.linear * part, waits.angular * part) for part in parts]
+    )
     twists = np.concatenate([twists[:-1], np.tile([waits.linear, waits.angular], (steps + 1, 1))])
     return np.append(times, times[-1] + left * share[1:]), np.concatenate([poses, arc[1:]]), twists
 

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from pushplan.control import LegFollower, Legs, Recovery
-from pushplan.control.recovery import warm_up_recovery
 from pushplan.geometry import VisibilityGraph
 from pushplan.planners.pushing import PushPath
 from pushplan.planners.rearrangement.push_controllers import GeometricPusher, PathPush
@@ -67,11 +66,6 @@ class GreedyPusher(RearrangementPolicy):
         self._attempt: _Attempt | None = None
         self._failures: Counter[int] = Counter()
         self._wait_until = -math.inf
-
-    def warm_up(self) -> None:
-        """Load the kernels that an episode may need."""
-        warm_up_recovery()
-        super().warm_up()
 
     def _act(self, world: World) -> Twist:
         command = self._recover(world) or self._work(PushScene(world, self.config))

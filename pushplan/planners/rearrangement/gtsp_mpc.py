@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from pushplan.control import ImmediateExecutor, PoseFollower, Recovery
-from pushplan.control.recovery import warm_up_recovery
 from pushplan.planners.rearrangement.push import Push, PushCost, PushHistory, push_plan, signature
 from pushplan.planners.rearrangement.push_choice import (
     PendingChoice,
@@ -109,11 +108,6 @@ class GtspMpc(RearrangementPolicy):
     def expect_noise(self, position: float, heading: float) -> None:
         """See `pushplan.world.ExpectsNoise`."""
         self.config = replace(self.config, position_noise=position, heading_noise=heading)
-
-    def warm_up(self) -> None:
-        """Load the kernels that an episode may need."""
-        warm_up_recovery()
-        super().warm_up()
 
     def _act(self, world: World) -> Twist:
         scene = self._observe(world)
