@@ -107,6 +107,17 @@ auto copied_rows(std::span<const T> values) {
   return nb::ndarray<nb::numpy, Number, nb::ndim<2>>(owned->data(), {values.size(), kColumns}, owner);
 }
 
+/// What an object of Python refers to, as an array that keeps the object: structures of `Number`,
+/// a row for each, or numbers.
+template <class Number, class Row, class Owner>
+auto shown(std::span<const Row> rows, const Owner& owner) {
+  constexpr std::size_t kColumns = sizeof(Row) / sizeof(Number);
+  constexpr std::size_t kRank = kColumns == 1 ? 1 : 2;
+  const std::array<std::size_t, 2> shape{rows.size(), kColumns};
+  return nb::ndarray<nb::numpy, const Number, nb::ndim<kRank>>(
+      reinterpret_cast<const Number*>(rows.data()), kRank, shape.data(), nb::find(owner));
+}
+
 /// (N, K, 3) numbers as N rows of K poses.
 inline ArrayView<Pose, 2> pose_rows(const FloatsOut<3>& array) {
   return {reinterpret_cast<Pose*>(array.data()),

@@ -89,6 +89,12 @@ void bind_shapes(nb::module_& module) {
       "polygon_inertia", [](const Points& polygon) { return polygon_inertia(points(polygon)); },
       "polygon"_a.noconvert());
   module.def(
+      "transform_points",
+      [](const OnePose& body, const Points& corners, const FloatsOut<2>& out) {
+        transform(pose(body), points(corners), reinterpret_cast<Vec2*>(out.data()));
+      },
+      "pose"_a.noconvert(), "points"_a.noconvert(), "out"_a.noconvert());
+  module.def(
       "transform_outlines",
       [](const Poses& bodies, const Points& vertices, const Integers<1>& offsets,
          const FloatsOut<2>& out) {
@@ -108,6 +114,8 @@ void bind_shapes(nb::module_& module) {
   def_fill_convex<float>(module);
   def_fill_convex<double>(module);
   def_fill_convex<bool>(module);
+  def_fill_convex<std::int32_t>(module);
+  def_fill_convex<std::int64_t>(module);
 }
 
 void bind_obstacles(nb::module_& module) {
@@ -121,6 +129,19 @@ void bind_obstacles(nb::module_& module) {
           "vertices"_a.noconvert(), "offsets"_a.noconvert(), "radii"_a.noconvert(),
           "boxes"_a.noconvert(), nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(),
           nb::keep_alive<1, 4>(), nb::keep_alive<1, 5>())
+      .def_prop_ro(
+          "vertices",
+          [](const Obstacles& self) { return shown<double>(self.cores.vertices, self); },
+          "(V, 2) corners of the cores [m], each counter-clockwise; a segment has two.")
+      .def_prop_ro(
+          "offsets", [](const Obstacles& self) { return shown<Index>(self.cores.offsets, self); },
+          "(C + 1,) where each core starts.")
+      .def_prop_ro(
+          "radii", [](const Obstacles& self) { return shown<double>(self.radii, self); },
+          "(C,) how far each obstacle reaches beyond its core [m].")
+      .def_prop_ro(
+          "boxes", [](const Obstacles& self) { return shown<double>(self.boxes, self); },
+          "(C, 4) x_min, y_min, x_max, y_max of each obstacle [m].")
       .def(
           "distance",
           [](const Obstacles& self, double x, double y) { return obstacle_distance({x, y}, self); },
@@ -170,6 +191,19 @@ void bind_visibility(nb::module_& module) {
           "discs"_a.noconvert(), "half_planes"_a.noconvert(), "vertices"_a.noconvert(),
           "offsets"_a.noconvert(), nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(),
           nb::keep_alive<1, 4>(), nb::keep_alive<1, 5>())
+      .def_prop_ro(
+          "discs", [](const Regions& self) { return shown<double>(self.discs, self); },
+          "(D, 3) x, y, radius [m]; a radius of 0 is a point.")
+      .def_prop_ro(
+          "half_planes", [](const Regions& self) { return shown<double>(self.half_planes, self); },
+          "(H, 4) point x, y [m] and unit normal; what is on or beyond the line belongs to it.")
+      .def_prop_ro(
+          "vertices",
+          [](const Regions& self) { return shown<double>(self.polygons.vertices, self); },
+          "(V, 2) corners of convex polygons [m], counter-clockwise; two make a segment.")
+      .def_prop_ro(
+          "offsets", [](const Regions& self) { return shown<Index>(self.polygons.offsets, self); },
+          "(P + 1,) where each polygon starts.")
       .def(
           "nearest",
           [](const Regions& self, Index k, double x, double y) {

@@ -19,6 +19,6 @@ from pushplan._core import (
 )
 
 
-SOURCES: str = '1a7ba3be2d43'
+SOURCES: str = 'c740e2598cbb'
 
 COMPILER: str = 'GNU 12.2.0'

@@ -19,6 +19,8 @@ def polygon_centroid(polygon: Annotated[NDArray[numpy.float64], dict(shape=(None
 
 def polygon_inertia(polygon: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> float: ...
 
+def transform_points(pose: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], points: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu')]) -> None: ...
+
 def transform_outlines(poses: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu', writable=False)], vertices: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], offsets: Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu')]) -> None: ...
 
 def arc_step(pose: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], distance: float, turn: float) -> tuple[float, float, float]: ...
@@ -35,10 +37,34 @@ def fill_convex(image: Annotated[NDArray[numpy.float64], dict(shape=(None, None)
 @overload
 def fill_convex(image: Annotated[NDArray[numpy.bool_], dict(shape=(None, None), order='C', device='cpu')], vertices_px: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], value: bool) -> None: ...
 
+@overload
+def fill_convex(image: Annotated[NDArray[numpy.int32], dict(shape=(None, None), order='C', device='cpu')], vertices_px: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], value: int) -> None: ...
+
+@overload
+def fill_convex(image: Annotated[NDArray[numpy.int64], dict(shape=(None, None), order='C', device='cpu')], vertices_px: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], value: int) -> None: ...
+
 class Obstacles:
     """Convex cores, each with a radius around it."""
 
     def __init__(self, vertices: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], offsets: Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C', device='cpu', writable=False)], radii: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], boxes: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> None: ...
+
+    @property
+    def vertices(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
+        """
+        (V, 2) corners of the cores [m], each counter-clockwise; a segment has two.
+        """
+
+    @property
+    def offsets(self) -> Annotated[NDArray[numpy.int64], dict(shape=(None,), writable=False)]:
+        """(C + 1,) where each core starts."""
+
+    @property
+    def radii(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
+        """(C,) how far each obstacle reaches beyond its core [m]."""
+
+    @property
+    def boxes(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
+        """(C, 4) x_min, y_min, x_max, y_max of each obstacle [m]."""
 
     def distance(self, x: float, y: float) -> float: ...
 
@@ -57,6 +83,26 @@ class Regions:
     """A union of discs, half-planes and convex polygons."""
 
     def __init__(self, discs: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], half_planes: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], vertices: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], offsets: Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> None: ...
+
+    @property
+    def discs(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
+        """(D, 3) x, y, radius [m]; a radius of 0 is a point."""
+
+    @property
+    def half_planes(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
+        """
+        (H, 4) point x, y [m] and unit normal; what is on or beyond the line belongs to it.
+        """
+
+    @property
+    def vertices(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
+        """
+        (V, 2) corners of convex polygons [m], counter-clockwise; two make a segment.
+        """
+
+    @property
+    def offsets(self) -> Annotated[NDArray[numpy.int64], dict(shape=(None,), writable=False)]:
+        """(P + 1,) where each polygon starts."""
 
     def nearest(self, k: int, x: float, y: float) -> tuple[float, float]: ...
 

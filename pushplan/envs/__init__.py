@@ -1,6 +1,6 @@
 """Environments: tasks and simulators behind one `PushEnv`.
 
-Importing this package registers the Gymnasium ids and loads neither an engine nor a kernel; the
+Importing this package registers the Gymnasium ids and loads no engine; the
 rest comes on first use. Since release 1.0 Gymnasium no longer looks for environments in installed
 packages, so either import this package first, or let Gymnasium do it::
 

@@ -1,4 +1,4 @@
-"""Compiled geometry: polygons, rasters, grids, shortest paths and distance fields."""
+"""Polygons, rasters, grids, shortest paths and distance fields."""
 
 from pushplan.geometry.convex import convex_distance, convex_overlap, convex_penetration
 from pushplan.geometry.distance_field import GeodesicField, geodesic_field, sample_values

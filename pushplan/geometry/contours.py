@@ -88,7 +88,8 @@ class _ContourMaker:
 
     def _make_some(self, first: int, last: int) -> None:
         """Add the contours of the obstacles from ``first`` to ``last`` (exclusive)."""
-        vertices, offsets, _, _ = self._shapes
+        vertices = self._shapes.vertices
+        offsets = self._shapes.offsets
         cores = vertices[offsets[first] : offsets[last]], offsets[first : last + 1] - offsets[first]
         points, owner = _outlines(*cores, self._radii[first:last], self._steps[first:last])
         ends = np.flatnonzero(np.diff(owner, append=-1)) + 1

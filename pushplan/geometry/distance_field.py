@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -11,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import ndimage
 
-from pushplan.compiled import kernel
 from pushplan.core import geometry as core
 from pushplan.geometry.contours import standoff_of
 from pushplan.geometry.grid import Grid, clearance_field
@@ -21,7 +19,6 @@ from pushplan.world import Goal, StaticMap
 from pushplan.world.checks import FloatArray, array, frozen, number
 
 
-@kernel(allocates=True)
 def sample_values(
     values: FloatArray,  # (rows, columns) distances [m], inf where there is no way
     ox: float,  # least x of the grid [m]
@@ -36,30 +33,7 @@ def sample_values(
     around the point differ by more, or one is not finite, a wall lies between them and the cell
     that holds the point counts alone, or if it has no value the least of the others.
     """
-    rows, cols = values.shape
-    result: float
-    u = min(max((x - ox) / step, 0.0), float(cols))
-    v = min(max((y - oy) / step, 0.0), float(rows))
-    own = values[min(int(v), rows - 1), min(int(u), cols - 1)]
-    u = max(u - 0.5, 0.0)
-    v = max(v - 0.5, 0.0)
-    j0 = min(int(u), cols - 1)
-    i0 = min(int(v), rows - 1)
-    j1 = min(j0 + 1, cols - 1)
-    i1 = min(i0 + 1, rows - 1)
-    a = values[i0, j0]
-    b = values[i0, j1]
-    c = values[i1, j0]
-    d = values[i1, j1]
-    low = min(min(a, b), min(c, d))
-    high = max(max(a, b), max(c, d))
-    if high - low <= 1.5 * step:  # false if one is inf
-        fu = u - j0
-        fv = v - i0
-        result = (a * (1.0 - fu) + b * fu) * (1.0 - fv) + (c * (1.0 - fu) + d * fu) * fv
-    else:
-        result = own if own < math.inf else low
-    return result
+    return core.sample(np.ascontiguousarray(values), ox, oy, step, x, y)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pushplan.geometry.obstacles import core_obstacles
+from pushplan.geometry.obstacles import obstacles_of
 from pushplan.world import InvalidInputError, StaticMap
 from pushplan.world.checked_fields import CheckedFields, PositiveFloat, Shape
 from pushplan.world.checks import (
@@ -95,8 +95,8 @@ def clearance_field(
     map are no obstacle. It is left undone where ``stopped``, asked every few milliseconds, says so.
     """
     out = np.empty(grid.shape)
-    shapes = core_obstacles(static)
-    piece = 1 + _PIECE // (1 + len(static.polygons) + len(static.segments))
+    shapes = obstacles_of(static)
+    piece = 1 + _PIECE // (1 + len(shapes.radii))
     for first in range(0, out.size, piece):
         if stopped():
             break

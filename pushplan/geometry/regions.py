@@ -5,15 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pushplan.core import geometry as core
 from pushplan.world import ClearanceArea, Goal, GoalDisc, GoalLine, InvalidInputError, Receptacle
-from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, IntArray, array, frozen
-from pushplan.world.outline import convex_outline, flatten
+from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, array
+from pushplan.world.outline import convex_outline, flatten, unflatten
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,17 +23,6 @@ class Polygons(ArrayRecord):
 
 
 Target = Goal | Polygons
-
-
-class Regions(NamedTuple):
-    """A union of discs, half-planes and convex polygons."""
-
-    discs: FloatArray  # (D, 3) x, y, radius [m]; a radius of 0 is a point
-    # (H, 4) point x, y [m] and unit normal; everything on or beyond the line belongs
-    lines: FloatArray
-    # (V, 2) corners of convex polygons [m], counter-clockwise; two make a segment
-    corners: FloatArray
-    offsets: IntArray  # (P + 1,) where each polygon starts
 
 
 def as_target(goal: Goal | Sequence[ArrayLike]) -> Target:
@@ -62,7 +50,7 @@ def as_target(goal: Goal | Sequence[ArrayLike]) -> Target:
     return Polygons(tuple(parts))
 
 
-def regions_of(target: Target, *, to_center: bool = False) -> Regions:
+def regions_of(target: Target, *, to_center: bool = False) -> core.Regions:
     """The regions of a checked target; ``to_center`` shrinks a disc to its centre.
 
     Those of a clearance area are its open edges, see `outside_area`.
@@ -82,7 +70,7 @@ def regions_of(target: Target, *, to_center: bool = False) -> Regions:
     else:
         parts = target.parts
     corners, offsets = flatten(parts)
-    return Regions(frozen(discs), frozen(lines), corners, offsets)
+    return core.Regions(discs, lines, corners, offsets)
 
 
 def outside_area(target: Target, points: FloatArray) -> BoolArray:
@@ -100,7 +88,7 @@ def outside_area(target: Target, points: FloatArray) -> BoolArray:
     return outside
 
 
-def region_crossings(regions: Regions, edges: FloatArray) -> FloatArray:
+def region_crossings(regions: core.Regions, edges: FloatArray) -> FloatArray:
     """Points (N, 2) [m] where outlines of the regions cross segments (E, 4) [m].
 
     A shortest path to a region ends at the region's nearest point or, where an obstacle covers
@@ -121,12 +109,11 @@ def region_crossings(regions: Regions, edges: FloatArray) -> FloatArray:
             hit = (square >= 0.0) & (t >= 0.0) & (t <= 1.0)
             found.append(start[hit] + t[hit, None] * along[hit])
     reach = 2.0 * np.abs(edges).max() + 1.0
-    for px, py, nx, ny in regions.lines.tolist():
+    for px, py, nx, ny in regions.half_planes.tolist():
         span = reach + math.hypot(px, py)
         line = np.array([[px - span * ny, py + span * nx, px + span * ny, py - span * nx]])
         found.append(core.segment_crossings(line, edges))
-    for i in range(len(regions.offsets) - 1):
-        loop = regions.corners[regions.offsets[i] : regions.offsets[i + 1]]
+    for loop in unflatten(regions.vertices, regions.offsets):
         sides = np.ascontiguousarray(np.hstack([loop, np.roll(loop, -1, axis=0)]))
         found.append(core.segment_crossings(sides, edges))
     return np.ascontiguousarray(np.concatenate(found))

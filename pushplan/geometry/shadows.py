@@ -19,7 +19,7 @@ from scipy import ndimage
 from pushplan.core import geometry as core
 from pushplan.geometry.contours import Contours, contours_of, gap_of, standoff_of
 from pushplan.geometry.grid import Grid, occupancy
-from pushplan.geometry.obstacles import core_obstacles
+from pushplan.geometry.obstacles import obstacles_of
 from pushplan.geometry.shortest_path import bends_of
 from pushplan.world import StaticMap
 from pushplan.world.checks import FloatArray, IntArray, frozen
@@ -46,7 +46,7 @@ class BendDistances:
     def in_sight(self, x: float, y: float) -> tuple[IntArray, FloatArray]:
         """Bends over which a shortest path from a point [m] may lead, and how far each is [m]."""
         sliver = standoff_of(self.static, 0.0)
-        around = core_obstacles(self.static)
+        around = obstacles_of(self.static)
         return core.bends_in_sight(x, y, self.bends.bends, around, gap_of(self.static), sliver)
 
 

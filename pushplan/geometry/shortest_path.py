@@ -20,9 +20,8 @@ from pushplan.geometry.contours import (
     gap_of,
     standoff_of,
 )
-from pushplan.geometry.obstacles import Obstacles, core_obstacles, obstacles_of
+from pushplan.geometry.obstacles import obstacles_of
 from pushplan.geometry.regions import (
-    Regions,
     Target,
     as_target,
     outside_area,
@@ -65,7 +64,7 @@ class _Graph(NamedTuple):
 
 @lru_cache(maxsize=32)
 def _graph_of(static: StaticMap, clearance: float) -> _Graph:
-    shapes = core_obstacles(static, clearance)
+    shapes = obstacles_of(static, clearance)
     gap = gap_of(static)
     every = contours_of(static, clearance)
     keep = shapes.free_points(every.corners, static.bounds, gap)
@@ -176,12 +175,12 @@ def _distances(
 ) -> GoalDistances:
     regions = regions_of(target, to_center=to_center)
     graph = _graph_of(static, clearance)
-    shapes = core_obstacles(static, clearance)
+    shapes = obstacles_of(static, clearance)
     gap = gap_of(static)
     ends = ends_on_rims(static, clearance, regions)
     corners = graph.contours
     count = len(corners.corners)
-    scene = core.GoalScene(core.Regions(*regions), shapes, static.bounds, gap)
+    scene = core.GoalScene(regions, shapes, static.bounds, gap)
     legs = scene.goal_legs(corners.corners)
     discs = np.hstack([ends, np.zeros((len(ends), 1))])
     none = np.zeros((0, 4)), np.zeros((0, 2)), np.zeros(1, dtype=np.int64)
@@ -208,13 +207,13 @@ def _distances(
     return GoalDistances(static, clearance, target, to_center, scene, nodes, places, ways, exits)
 
 
-def ends_on_rims(static: StaticMap, clearance: float, regions: Regions) -> FloatArray:
+def ends_on_rims(static: StaticMap, clearance: float, regions: core.Regions) -> FloatArray:
     """Find (N, 2) points [m] where a path may end at the rim of what covers a part of the goal."""
     shapes = obstacles_of(static, clearance)
     contours = contours_of(static, clearance)
     which = None
-    if not len(regions.lines):  # only obstacles near it can cover a part of it
-        around = np.concatenate([regions.discs[:, :2], regions.corners])
+    if not len(regions.half_planes):  # only obstacles near it can cover a part of it
+        around = np.concatenate([regions.discs[:, :2], regions.vertices])
         reach = regions.discs[:, 2].max(initial=0.0) + standoff_of(static, clearance)
         low = around.min(axis=0, initial=np.inf) - reach
         high = around.max(axis=0, initial=-np.inf) + reach
@@ -222,8 +221,7 @@ def ends_on_rims(static: StaticMap, clearance: float, regions: Regions) -> Float
         which = near[contours.owner]
     rims = [contour_edges(contours, which), box_edges(static.bounds)]
     ends = region_crossings(regions, np.concatenate(rims))
-    free = core_obstacles(static, clearance).free_points(ends, static.bounds, gap_of(static))
-    return ends[free]
+    return ends[shapes.free_points(ends, static.bounds, gap_of(static))]
 
 
 def goal_distances(
@@ -258,13 +256,12 @@ def leave_inflation(static: StaticMap, clearance: float, point: FloatArray) -> F
     """
     x, y = point.tolist()
     gap = gap_of(static)
-    raw = core_obstacles(static)
-    around = core_obstacles(static, clearance)
+    raw = obstacles_of(static)
+    grown = obstacles_of(static, clearance)
     if raw.distance(x, y) < -gap:
         return None
-    if around.distance(x, y) >= gap:
+    if grown.distance(x, y) >= gap:
         return point
-    grown = obstacles_of(static, clearance)
     away = np.maximum(np.maximum(grown.boxes[:, :2] - point, point - grown.boxes[:, 2:]), 0.0)
     distances = np.hypot(away[:, 0], away[:, 1])
     reach = 2.0 * float(grown.radii.max()) + gap
@@ -272,7 +269,7 @@ def leave_inflation(static: StaticMap, clearance: float, point: FloatArray) -> F
         near = np.flatnonzero(distances <= reach)
         found = [_ways_out(static, clearance, near), _pushed_out(point, grown, near, 2.0 * gap)]
         places = np.ascontiguousarray(np.concatenate(found))
-        places = places[around.free_points(places, static.bounds, gap)]
+        places = places[grown.free_points(places, static.bounds, gap)]
         steps = np.hypot(*(places - point).T)
         for i in np.argsort(steps, kind="stable").tolist():
             px, py = places[i].tolist()
@@ -295,7 +292,9 @@ def _ways_out(static: StaticMap, clearance: float, near: IntArray) -> FloatArray
     return np.ascontiguousarray(np.concatenate(found))
 
 
-def _pushed_out(point: FloatArray, shapes: Obstacles, near: IntArray, extra: float) -> FloatArray:
+def _pushed_out(
+    point: FloatArray, shapes: core.Obstacles, near: IntArray, extra: float
+) -> FloatArray:
     """The point (2,) carried straight to ``extra`` [m] outside obstacles ``near``, as (C, 2)."""
     found = np.empty((len(near), 2))
     for i, k in enumerate(near.tolist()):

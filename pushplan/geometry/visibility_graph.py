@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from pushplan.core import geometry as core
 from pushplan.geometry.contours import contours_of, gap_of, prepare_contours, standoff_of
-from pushplan.geometry.obstacles import core_obstacles, obstacles_of
+from pushplan.geometry.obstacles import obstacles_of
 from pushplan.geometry.regions import Target, as_target, outside_area, regions_of
 from pushplan.geometry.shortest_path import Path, ends_on_rims, leave_inflation, with_way_out
 from pushplan.world import Goal, StaticMap
@@ -80,8 +80,8 @@ class VisibilityGraph:
         clearance = self.clearance
         gap = gap_of(static)
         regions = regions_of(target)
-        around = core_obstacles(static, clearance)
-        scene = core.GoalScene(core.Regions(*regions), around, static.bounds, gap)
+        around = obstacles_of(static, clearance)
+        scene = core.GoalScene(regions, around, static.bounds, gap)
         contours = contours_of(static, clearance)
         points = np.concatenate([contours.corners, ends_on_rims(static, clearance, regions)])
         search = core.VisibilitySearch(
@@ -140,4 +140,4 @@ def _boxes_of(static: StaticMap, clearance: float) -> tuple[IntArray, FloatArray
 
 @lru_cache(maxsize=32)
 def _obstacle_grid(static: StaticMap, clearance: float) -> core.ObstacleGrid:
-    return core.ObstacleGrid(core_obstacles(static, clearance), gap_of(static))
+    return core.ObstacleGrid(obstacles_of(static, clearance), gap_of(static))

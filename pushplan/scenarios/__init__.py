@@ -1,6 +1,6 @@
 """Fully specified starts, named lists of them, and fields of broken ice.
 
-What makes ice loads compiled kernels, and only comes on first use.
+What makes ice only comes on first use.
 """
 
 from __future__ import annotations

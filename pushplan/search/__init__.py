@@ -1,1 +1,1 @@
-"""Graph search: A* over any lattice, heaps, shortest paths on grids. Knows no robot."""
+"""Shortest paths on grids. Knows no robot."""

@@ -21,7 +21,7 @@ from pushplan.envs.simulators.momentum import Momentum
 from pushplan.envs.simulators.pymunk_bodies import PymunkBodies
 from pushplan.envs.simulators.pymunk_drive import PymunkDriver, PymunkOptions
 from pushplan.envs.trace import Trace
-from pushplan.geometry.obstacles import core_obstacles
+from pushplan.geometry.obstacles import obstacles_of
 from pushplan.interaction.interaction_model import Interaction
 from pushplan.world import Twist, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, frozen, number
@@ -177,7 +177,7 @@ class PymunkSimulator(Simulator):
             limit,
             self.options.travel * self._size,
             self._object_rows(),
-            core_obstacles(self._world.static),
+            obstacles_of(self._world.static),
         )
 
     def _object_rows(self) -> FloatArray:

@@ -13,7 +13,7 @@ from pushplan.control.limits import driven_twist
 from pushplan.control.mpc.horizon import Horizon, make_horizon, solve_rounds, track_of
 from pushplan.control.mpc.quadratic_program import ProgramSolver
 from pushplan.core import pushing as core
-from pushplan.geometry.obstacles import core_obstacles
+from pushplan.geometry.obstacles import obstacles_of
 from pushplan.planners.pushing.bumper import faces_of
 from pushplan.planners.pushing.parameters import PushingConfig
 from pushplan.planners.pushing.push_model import PushModel, PushState
@@ -151,7 +151,7 @@ class PushingMpc:
         if not tracker.observe(self._track, pose, box, time, held):
             return tracker.send(0.0, 0.0, time, held)
         solved = self._solve(tracker)
-        return tracker.drive(core_obstacles(world.static), solved, time, held)
+        return tracker.drive(obstacles_of(world.static), solved, time, held)
 
     def _solve(self, tracker: core.PushTracker) -> bool:
         assert self._horizon is not None

@@ -13,7 +13,7 @@ import numpy as np
 
 from pushplan.control.mpc.horizon import track_of
 from pushplan.core import pushing as core
-from pushplan.geometry.obstacles import core_obstacles
+from pushplan.geometry.obstacles import obstacles_of
 from pushplan.planners.pushing.mpc import _SAFE_FRACTION, _WEIGHTS, PushingMpc, groups_of
 from pushplan.world import RobotModel, World
 from pushplan.world.checks import FloatArray, IntArray
@@ -53,7 +53,7 @@ class NonlinearPushingMpc(PushingMpc):
         if not self._solve(tracker):
             nominal[:] = [world.robot.max_speed, 0.0]
         nominal[:] = self._refined(world.robot, nominal.copy())
-        return tracker.drive(core_obstacles(world.static), True, world.time, held)
+        return tracker.drive(obstacles_of(world.static), True, world.time, held)
 
     def _refined(self, robot: RobotModel, commands: FloatArray) -> FloatArray:
         """The best of commands (M, 2) and of what IPOPT makes of them."""
