@@ -27,13 +27,13 @@ _ENGINES = ("mujoco", "pymunk")
 _GIT_S = 5.0
 UNSEEN = frozenset(
     {
-        *("_core", "cli", "ros", "training", "evaluation/report", "evaluation/statistics"),
+        *("cli", "ros", "training", "evaluation/report", "evaluation/statistics"),
         *("evaluation/store/merging", "evaluation/store/rescoring", "evaluation/store/salvaging"),
         *("evaluation/store/status", "evaluation/run/reproduction"),
     }
 )
-"""Rooms and files of the package that no episode runs through, and the compiled core, which
-`versions` names by its sources. All others count."""
+"""Rooms and files of the package that no episode runs through. All others count."""
+_CORE = "_core"  # the module and its stubs; `versions` names it by its sources and compiler
 
 
 def provenance(workers: int) -> dict[str, Any]:
@@ -126,9 +126,9 @@ def package_digest() -> str:
     for path in sorted(root.rglob("*")):
         where = path.relative_to(root)
         name = where.as_posix()
-        first = where.parts[0]
-        rooms = {first.partition(".")[0], "/".join(where.parts[:2]), name.removesuffix(".py")}
-        left_out = rooms & UNSEEN or path.suffix == ".md" or name.startswith(".")
+        rooms = {where.parts[0], "/".join(where.parts[:2]), name.removesuffix(".py")}
+        is_core = where.parts[0].partition(".")[0] == _CORE
+        left_out = is_core or rooms & UNSEEN or path.suffix == ".md" or name.startswith(".")
         if path.is_file() and "__pycache__" not in where.parts and not left_out:
             digest.update(f"{name}\0".encode() + path.read_bytes() + b"\0")
     return digest.hexdigest()[:12]
