@@ -19,6 +19,6 @@ from pushplan._core import (
 )
 
 
-SOURCES: str = 'c740e2598cbb'
+SOURCES: str = '996e7cbf3f7c'
 
 COMPILER: str = 'GNU 12.2.0'
