@@ -27,9 +27,9 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 import numpy as np
+from pushplan.compiled import watching
 
 from benchmarks.reporting import command_line, resident_mb
-from pushplan.compiled import watching
 from pushplan.runtime import Runner
 from pushplan.runtime.runner import PLAN_STOP
 from pushplan.scenarios import suite

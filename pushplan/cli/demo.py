@@ -15,7 +15,7 @@ EPISODES = {
     "ship-ice-2d-10": "skeleton",
     "area-clearing-2d-10-clear-small": "greedy",
 }
-"""Suite -> the policy that is shown in its first start: those whose kernels compile fast."""
+"""Suite -> the policy that is shown in its first start: quick ones."""
 _MOST_WORKERS = 3
 
 
@@ -37,7 +37,7 @@ def run(options: argparse.Namespace) -> int:
         for scenario in suite(name, episodes=1).scenarios
     ]
     say(f"{len(EPISODES)} episodes; the first time they take up to a minute:")
-    with progress_of(*EPISODES.values(), out=options.out) as progress:
+    with progress_of(options.out) as progress:
         workers = min(os.cpu_count() or 1, _MOST_WORKERS)
         about = {"suite": "demo"}
         run_batch(jobs, out=options.out, workers=workers, about=about, progress=progress)

@@ -1,4 +1,4 @@
-"""``pushplan doctor``: what is installed, what is missing, what is compiled, what can draw."""
+"""``pushplan doctor``: what is installed and missing, how the core was built, what can draw."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pushplan.cli.common import has_screen, say, say_json
 from pushplan.errors import PushplanError
 from pushplan.imports.on_demand import EXTRAS
 
-BASE = ("numba", "numpy", "ompl", "yaml", "ruckig", "scipy", "shapely")
+BASE = ("numpy", "ompl", "yaml", "ruckig", "scipy", "shapely")
 """Libraries that come with pushplan itself; Ruckig where it has a wheel."""
 _DISPLAYS = ("EGL", "OSMesa")
 """Libraries with which MuJoCo draws where there is no screen."""
@@ -56,7 +56,6 @@ def examine() -> dict[str, Any]:
             for extra, lost in missing.items()
         },
         "core": _core(),
-        "kernels": _kernels() if libraries["numba"] is not None else None,
         "drawing": {
             **{name: ctypes.util.find_library(name) is not None for name in _DISPLAYS},
             "screen": has_screen(),
@@ -87,21 +86,6 @@ def _core() -> dict[str, Any]:
     return {"compiler": core.COMPILER, "sources": core.SOURCES, "problem": problem}
 
 
-def _kernels() -> dict[str, Any]:
-    from pushplan.cli.kernel_progress import every_kernel
-    from pushplan.compiled import cached_kernels
-    from pushplan.compiled.cache_files import find_folders
-
-    names = every_kernel()
-    folders = find_folders(__file__)
-    return {
-        "compiled": len(cached_kernels(names)),
-        "known": len(names),
-        "cache": None if folders.write is None else str(folders.write),
-        "NUMBA_CACHE_DIR": os.environ.get("NUMBA_CACHE_DIR"),
-    }
-
-
 def _tell(found: dict[str, Any]) -> None:
     say(f"pushplan {found['pushplan']}, Python {found['python']}, {found['system']}, ", end="")
     say(f"{found['cores']} cores")
@@ -119,21 +103,8 @@ def _tell(found: dict[str, Any]) -> None:
             say(f"{extra}: {said(name for name in EXTRAS if EXTRAS[name] == extra)}")
     core = found["core"]
     say(f"core: {core['problem'] or 'built by ' + core['compiler']}")
-    if (kernels := found["kernels"]) is not None:
-        _tell_kernels(kernels)
     drawing = found["drawing"]
     usable = [f"{name} {'yes' if drawing[name] else 'no'}" for name in (*_DISPLAYS, "screen")]
     say(f"MuJoCo's camera and windows: {', '.join(usable)}")
     if not any(drawing[name] for name in (*_DISPLAYS, "screen")):
         say("  render_mode 'camera' needs one of them: on Debian 'apt install libegl1'")
-
-
-def _tell_kernels(kernels: dict[str, Any]) -> None:
-    say(f"kernels: {kernels['compiled']} of {kernels['known']} compiled, ", end="")
-    if kernels["cache"] is None:
-        say("no folder for them can be written to: each process compiles anew")
-        return
-    more = ""
-    if kernels["compiled"] != kernels["known"]:
-        more = "; all of them: pushplan compile"
-    say(f"kept in {kernels['cache']} and its like{more}")

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pushplan.cli.common import milliseconds, say, say_json
-from pushplan.cli.kernel_progress import kernel_progress
 from pushplan.cli.output_files import check_figure, check_file
 
 if TYPE_CHECKING:
@@ -22,7 +21,6 @@ def run(options: argparse.Namespace) -> int:
     """Plan, say what came of it, write files."""
     from pushplan.errors import describe
     from pushplan.evaluation import parse_planner
-    from pushplan.planners import warm_up
     from pushplan.world import (
         Deadline,
         MaxIterations,
@@ -43,9 +41,6 @@ def run(options: argparse.Namespace) -> int:
     world = load_world(options.world)
     spec = parse_planner(options.planner)
     planner = spec.make_planner()
-    if isinstance(spec.source, str) and spec.is_ours:
-        with kernel_progress(spec.source):
-            warm_up(spec.source)  # a deadline is for planning, not for loading kernels
     try:
         made = planner.plan(world, stop=stop, rng=stream(options.seed, "policy"))
         result = expect("what the planner returns", made, PlanResult)

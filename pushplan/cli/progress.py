@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import sys
-import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING
 
 from pushplan.cli.common import duration
-from pushplan.cli.kernel_progress import PendingKernels, kernel_progress
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
-
     from pushplan.evaluation import ResultRow
 
     Progress = Callable[[int, int, ResultRow | None], None]
@@ -23,24 +19,21 @@ _LINE_EVERY_S = 10.0
 
 
 @contextmanager
-def progress_of(*policies: str, out: str | None = None) -> Iterator[Progress]:
-    """Kernels while they are compiled, here or in workers; then jobs; after Ctrl-C what is kept.
+def progress_of(out: str | None = None) -> Iterator[Progress]:
+    """How many jobs are done; after Ctrl-C what is kept.
 
     Args:
-        policies: names; what they compile is known of those that come with pushplan.
         out: the run directory, if it is kept.
     """
     finished = 0
     try:
-        with ExitStack() as running, ExitStack() as compiling:
-            compiling.enter_context(kernel_progress(*policies))
-            show: Progress = _Lines(policies)
+        with ExitStack() as running:
+            show: Progress = _Lines()
             if sys.stderr.isatty():
-                show = _bar(running, policies)
+                show = _bar(running)
 
             def update(done: int, total: int, row: ResultRow | None) -> None:
                 nonlocal finished
-                compiling.close()
                 show(done, total, row)
                 finished = done
 
@@ -63,11 +56,10 @@ def _stopped(finished: int, out: str) -> str:
     )
 
 
-def _bar(running: ExitStack, policies: tuple[str, ...]) -> Progress:
-    """A bar that appears with the first update, when the kernels are there."""
+def _bar(running: ExitStack) -> Progress:
+    """A bar that appears with the first update."""
     from rich import progress as rich
     from rich.console import Console
-    from rich.text import Text
 
     columns = (
         rich.BarColumn(),
@@ -77,24 +69,12 @@ def _bar(running: ExitStack, policies: tuple[str, ...]) -> Progress:
         rich.TimeRemainingColumn(),
         rich.TextColumn("left {task.description}"),
     )
-    pending = PendingKernels()
-
-    class Bar(rich.Progress):
-        def get_renderables(self) -> Iterable[RenderableType]:
-            if text := str(pending):
-                yield Text(text)
-            else:
-                yield from super().get_renderables()
-
-    bar = Bar(*columns, console=Console(stderr=True), transient=True, refresh_per_second=4)
+    terminal = Console(stderr=True)
+    bar = rich.Progress(*columns, console=terminal, transient=True, refresh_per_second=4)
     failed = 0
 
     def update(done: int, total: int, row: ResultRow | None) -> None:
-        nonlocal failed, pending
-        if row is not None:
-            pending.finish()
-        elif done < total:
-            pending = PendingKernels(*policies)
+        nonlocal failed
         failed += row is not None and row.failed
         text = f"[red]{failed} failed" if failed else ""
         if not bar.task_ids:
@@ -109,20 +89,10 @@ def _bar(running: ExitStack, policies: tuple[str, ...]) -> Progress:
 class _Lines:
     """Progress for a log file."""
 
-    def __init__(self, policies: tuple[str, ...]) -> None:
-        self._policies = policies
+    def __init__(self) -> None:
         self._began = time.monotonic()
         self._next = self._began + _LINE_EVERY_S
         self._there = 0
-        self._waiting = threading.Event()  # for the first row: set when it is there
-
-    def _say_compiling(self) -> None:
-        """Say once that kernels are compiled, if so and as soon as a process does it."""
-        pending = PendingKernels(*self._policies)
-        while not self._waiting.wait(0.5):
-            if text := str(pending):
-                sys.stderr.write(f"{text}; later runs find them in the cache\n")
-                return
 
     def __call__(self, done: int, total: int, row: ResultRow | None) -> None:
         now = time.monotonic()
@@ -131,10 +101,7 @@ class _Lines:
             self._there = done
             if done:
                 sys.stderr.write(f"{done} of {total} episodes are there already\n")
-            if done < total and self._policies:
-                threading.Thread(target=self._say_compiling, daemon=True).start()
             return
-        self._waiting.set()
         if done == total or now >= self._next:
             self._next = now + _LINE_EVERY_S
             rate = (done - self._there) / max(now - self._began, 1e-3)

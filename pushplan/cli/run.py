@@ -13,7 +13,6 @@ from pushplan.cli.common import (
     save_episode,
     say,
 )
-from pushplan.cli.kernel_progress import kernel_progress
 from pushplan.cli.scenario_options import scenario_of
 
 if TYPE_CHECKING:
@@ -36,8 +35,7 @@ def run(options: argparse.Namespace) -> int:
     settings = JobSettings(observation=options.observation)
     mode = "human" if options.live else None
     env = settings.environment(scenario, policy, render_mode=mode)
-    with kernel_progress(spec.label):
-        dry_run(Job(spec, scenario), settings)  # so that no timing holds loading and compiling
+    dry_run(Job(spec, scenario), settings)  # so that no timing holds the loading of libraries
     try:
         episode = run_episode(
             env, policy, scenario, observer=camera, latency_factor=options.latency

@@ -6,7 +6,6 @@ import argparse
 import sys
 from dataclasses import replace
 
-from pushplan.cli.kernel_progress import kernel_progress
 from pushplan.cli.scenario_options import variations
 
 
@@ -43,7 +42,5 @@ def run(options: argparse.Namespace) -> int:
         sys.stdout.write(f"{spec.label} is served at {server.address} ({PROTOCOL})\n")
         sys.stdout.flush()
 
-    with kernel_progress(spec.label):
-        server.warm_up()
     server.serve_forever(ready)
     return 0

@@ -73,7 +73,7 @@ def stress(options: argparse.Namespace) -> int:
     from pushplan.evaluation.report.table_formats import markdown, text
 
     check_directory(options.out)
-    with progress_of(options.policy, out=options.out) as progress:
+    with progress_of(options.out) as progress:
         sheet = evaluation.stress(
             options.policy,
             options.suite,
@@ -116,7 +116,7 @@ def _run(experiment: Experiment, out: str, options: argparse.Namespace) -> int:
         (sys.stdout if options.check else sys.stderr).write(f"{line}\n")
     if options.check:
         return 0
-    with progress_of(*(one.label for one in experiment.policies), out=out) as progress:
+    with progress_of(out) as progress:
         results = experiment.run(out, progress=progress, dask=options.dask, **chosen)
     if getattr(options, "json", False):
         show_json(results, options.pairs)

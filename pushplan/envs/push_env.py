@@ -17,7 +17,7 @@ from pushplan.control import clamp_twist
 from pushplan.envs.action_modes import ActionMode, Motion, chosen_action, waiting
 from pushplan.envs.registry import ACTIONS, SIMULATORS, TASKS, default_preset
 from pushplan.envs.rendering import Renderer
-from pushplan.envs.simulators.base import Simulator, warm_up_simulator
+from pushplan.envs.simulators.base import Simulator
 from pushplan.envs.tasks.base import StepOutcome, Task
 from pushplan.envs.trace import Trace
 from pushplan.imports.on_demand import look_up
@@ -154,12 +154,6 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
     def observation_builder(self) -> ObservationBuilder:
         """Builder of the observations."""
         return self._builder
-
-    def warm_up(self) -> None:
-        """Load the kernels of the simulator; ends the episode."""
-        self._over = "warm_up() has ended the episode"
-        world = self.task.start(stream(0, "layout"))
-        warm_up_simulator(self._simulator, world, self.task.materials)
 
     @property
     def world(self) -> World:

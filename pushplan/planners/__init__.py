@@ -1,7 +1,13 @@
 """Planners and the policies made of them. Imports no simulator and no learning library."""
 
 from pushplan.imports.on_demand import lazy_names
-from pushplan.planners.registry import make_planner, make_policy, planner_names, policy_names
+from pushplan.planners.registry import (
+    make_planner,
+    make_policy,
+    planner_names,
+    policy_names,
+    warm_up,
+)
 from pushplan.world import Deadline, MaxIterations, Planner, PlanResult, PlanStatus, Policy, World
 
 __all__ = [
@@ -38,6 +44,5 @@ __getattr__, __dir__ = lazy_names(
         "push_aware": "PushAware",
         "ship_lattice.ship_lattice": "ShipLattice",
         "shortest_path": "ShortestPath",
-        "kernel_warmup": "warm_up",
     },
 )

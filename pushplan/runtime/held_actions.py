@@ -8,7 +8,6 @@ import numpy as np
 
 from pushplan.control import ImmediateExecutor
 from pushplan.planners import make_policy, policy_for
-from pushplan.planners.kernel_warmup import warm_up_policy
 from pushplan.world import (
     ChoosesActions,
     ChoosesObservation,
@@ -52,10 +51,6 @@ class HeldActions:
         self._pending: PendingResult[Any] | None = None
         self._twist = Twist(0.0, 0.0)
         self._since = -np.inf
-
-    def warm_up(self) -> None:
-        """See `pushplan.world.WarmsUp`."""
-        warm_up_policy(self._policy)
 
     def reset(self, world: World, rng: np.random.Generator) -> None:
         """Forget the last episode."""

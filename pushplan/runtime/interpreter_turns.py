@@ -24,7 +24,7 @@ def take_short_turns() -> None:
             _before = sys.getswitchinterval()
             sys.setswitchinterval(min(_SWITCH, _before))
             gc.collect()
-            gc.freeze()  # else a collection amid driving goes through all modules and kernels
+            gc.freeze()  # else a collection amid driving goes through all modules
 
 
 def take_usual_turns() -> None:

@@ -16,7 +16,6 @@ import numpy as np
 from pushplan.control import waiting_twist
 from pushplan.control.limits import driven_twist
 from pushplan.errors import describe
-from pushplan.planners.kernel_warmup import warm_up_policy
 from pushplan.runtime.command import Command, CommandStatus, RunLog
 from pushplan.runtime.held_actions import drivable
 from pushplan.runtime.interpreter_turns import take_short_turns, take_usual_turns
@@ -178,12 +177,11 @@ class Runner:
         self.close()
 
     def start(self, world: World) -> Command:
-        """Begin an episode: load all kernels, and give the first command.
+        """Begin an episode, and give the first command.
 
-        That may take seconds in a new process, and minutes after an installation; nothing is
-        compiled afterwards. The robot is taken to drive as the world says. Until `close` threads
-        of this process take shorter turns, and what is in memory now is no matter of Python's
-        garbage collector, so that neither delays commands.
+        The robot is taken to drive as the world says. Until `close` threads of this process take
+        shorter turns, and what is in memory now is no matter of Python's garbage collector, so
+        that neither delays commands.
 
         Args:
             world: the first snapshot. Its clock is that of `update` and `command`.
@@ -192,9 +190,6 @@ class Runner:
             InvalidInputError: if the policy cannot be used in such a world.
         """
         world = self._allowance.planning_world(world)
-        if not self.worlds:  # the first time
-            warm_up_policy(self.policy)
-        self._estimator.warm_up(world)
         with self._lock:
             self._forget()
             self._newest = world

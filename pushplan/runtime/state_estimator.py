@@ -42,10 +42,6 @@ class StateEstimator:
         self._ahead: World | None = None
         """The newest snapshot, as far as it has been brought forward."""
 
-    def warm_up(self, world: World) -> None:
-        """Load the kernels of predictions in worlds of this kind."""
-        default_interaction(world).sweep(world, np.stack([world.robot_pose, world.robot_pose]))
-
     def reset(self) -> None:
         """Forget everything."""
         self._sent.clear()

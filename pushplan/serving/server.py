@@ -17,7 +17,6 @@ from typing import TypeVar
 
 from pushplan.errors import short
 from pushplan.planners import make_policy
-from pushplan.planners.kernel_warmup import warm_up_policy
 from pushplan.runtime.held_actions import check_world_policy
 from pushplan.serving.address import Address
 from pushplan.serving.connection import Connection, RefusedError, ServerLimits
@@ -96,7 +95,7 @@ class PolicyServer:
         self._numbers = itertools.count(1)
         self._present: dict[int, tuple[Connection, Session]] = {}
         self._refused = 0  # clients that are being told why
-        self._warm = self._over = False
+        self._over = False
         self._ended = True
         self._thread: threading.Thread | None = None
         self._inode = 0
@@ -122,21 +121,14 @@ class PolicyServer:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def warm_up(self) -> None:
-        """Load all kernels, once: that takes seconds, and minutes after an installation."""
-        if not self._warm:
-            warm_up_policy(self._policy())
-            self._warm = True
-
     def start(self) -> None:
-        """Load all kernels, and serve in threads until `close`.
+        """Serve in threads until `close`.
 
         Raises:
             InvalidInputError: if it serves already, or cannot listen at the address.
         """
         if self._thread is not None:
             raise InvalidInputError(f"the server at {self.address} serves already")
-        self.warm_up()
         listener = self._address.listen()
         if self._address.path:
             self._inode = os.stat(self._address.path).st_ino
@@ -167,7 +159,7 @@ class PolicyServer:
         return self._ended
 
     def serve_forever(self, ready: Callable[[], object] = lambda: None) -> bool:
-        """Load all kernels, and serve until SIGINT, SIGTERM or SIGHUP; called by the main thread.
+        """Serve until SIGINT, SIGTERM or SIGHUP; called by the main thread.
 
         Args:
             ready: called when clients can connect.
@@ -179,7 +171,6 @@ class PolicyServer:
             InvalidInputError: as `start`.
         """
         over = threading.Event()
-        self.warm_up()
         before = {
             one: signal.signal(one, lambda *_: over.set())
             for one in _SIGNALS

@@ -32,7 +32,6 @@ from pushplan.world.policy_abilities import (
     PlanningExecutor,
     PlansBesideDriving,
     ShowsPlan,
-    WarmsUp,
 )
 from pushplan.world.protocols import Controller, Planner, Policy
 from pushplan.world.robot import Drive, RobotModel
@@ -111,7 +110,6 @@ __all__ = [
     "SubTask",
     "Twist",
     "UnknownNameError",
-    "WarmsUp",
     "WheelSpeeds",
     "World",
     "area_clearing_robot",

@@ -170,11 +170,3 @@ def shown_plan(policy: object) -> Plan | None:
     if isinstance(policy, ShowsPlan):
         return policy.current_plan
     return None
-
-
-@runtime_checkable
-class WarmsUp(Protocol):
-    """Says itself how its compiled kernels are loaded ahead; others are run in a small world."""
-
-    def warm_up(self) -> None:
-        """Run, once a process, all that an episode may need."""

@@ -10,10 +10,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from pushplan.cli.kernel_progress import PendingKernels, expected_kernels
 
 from pushplan.cli import build_parser, main
 from pushplan.cli.doctor import BASE
-from pushplan.cli.kernel_progress import PendingKernels, expected_kernels
 from pushplan.errors import unknown_name_message
 from pushplan.imports.on_demand import EXTRAS
 

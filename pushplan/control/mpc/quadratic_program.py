@@ -25,7 +25,7 @@ _SETTINGS = {
 
 
 class QuadraticProgram(NamedTuple):
-    """Minimise 1/2 xᵀPx + qᵀx over n commands in blocks of M, as the kernels fill it."""
+    """Minimise 1/2 xᵀPx + qᵀx over n commands in blocks of M, as the core fills it."""
 
     moves: int  # M
     blocks: IntArray  # (B,) first variable of each block whose changes are bounded

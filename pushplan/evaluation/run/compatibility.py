@@ -96,11 +96,7 @@ def incompatibility(spec: PolicySpec, scenario: Any, settings: JobSettings) -> s
         return str(error)
     with contextlib.closing(env):
         if spec.is_ours:
-            reason = _first_step(policy, scenario, env)
-            if reason is None and settings.dry_run:
-                spec.warm_up()  # what is compiled here, workers find in the cache
-                env.warm_up()
-            return reason
+            return _first_step(policy, scenario, env)
     return None
 
 

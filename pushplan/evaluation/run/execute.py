@@ -44,7 +44,6 @@ from pushplan.world.policy_abilities import (
     LogsPlans,
     PlansBesideDriving,
     ShowsPlan,
-    WarmsUp,
 )
 
 DRY_RUN_STEPS = 2
@@ -157,19 +156,15 @@ def _execute(job: Job, settings: JobSettings) -> JobResult:
 
 
 def dry_run(job: Job, settings: JobSettings) -> None:
-    """Load and compile what a job needs; what goes wrong here goes wrong again in the job."""
+    """Load what a job needs; what goes wrong here goes wrong again in the job."""
     what = (job.policy.label, job.policy.identity, job.title)
     if what in _dry_runs:
         return
     _dry_runs.add(what)
-    with contextlib.suppress(Exception):
-        job.policy.warm_up()
     with contextlib.suppress(Exception, SystemExit):
         policy = job.policy.make()
         env = settings.environment(job.scenario, policy)
         try:
-            if isinstance(env, WarmsUp):
-                env.warm_up()
             Recording(policy, job.scenario).run(env, limit=DRY_RUN_STEPS)
         finally:
             getattr(env, "close", _nothing)()

@@ -123,13 +123,6 @@ class PolicySpec:
             return weights_of(self.source)
         return None
 
-    def warm_up(self) -> None:
-        """Load, once in a process, what a planner of ours may need in any step of an episode."""
-        if self.is_ours and self.network is None:
-            from pushplan.planners import warm_up
-
-            warm_up(str(self.source))
-
     def make(self) -> Policy:
         """A fresh policy.
 

@@ -19,7 +19,7 @@ from pushplan import core
 from pushplan.evaluation.store.rows import instant
 
 PACKAGES = (
-    *("casadi", "gymnasium", "llvmlite", "mujoco", "numba", "numpy", "ompl", "onnxruntime"),
+    *("casadi", "gymnasium", "mujoco", "numpy", "ompl", "onnxruntime"),
     *("osqp", "pymunk", "ruckig", "scipy", "shapely", "torch"),
 )
 """Packages that results may depend on; those that are installed are named."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from collections import deque
 from typing import Any
@@ -18,7 +17,6 @@ from pushplan.planners.mppi.mppi import Decision, Mppi
 from pushplan.planners.mppi.mppi_config import MppiConfig
 from pushplan.planners.mppi.rollout_model import step_length
 from pushplan.planners.mppi.target_choice import TargetChoice
-from pushplan.planners.warm_up_worlds import warm_up_worlds
 from pushplan.world import (
     GoalDisc,
     GoalLine,
@@ -82,10 +80,6 @@ class MppiPolicy:
     def plan_with(self, executor: PlanningExecutor) -> None:
         """See `pushplan.world.PlansBesideDriving`."""
         self._executor: PlanningExecutor = executor
-
-    def warm_up(self) -> None:
-        """Load the kernels that an episode may need."""
-        _warm_up()
 
     def act(self, world: World, observation: Any = None) -> Twist:
         """The velocity for this step.
@@ -151,13 +145,3 @@ def _costs(world: World, config: MppiConfig, targets: TargetChoice) -> list[Roll
     if isinstance(world.goal, GoalDisc | GoalLine):
         return navigation_costs(world, config)
     return manipulation_costs(world, config, targets.approach(world))
-
-
-@functools.cache
-def _warm_up() -> None:
-    """Decide a few times in a small world for each kind of goal."""
-    for world in warm_up_worlds("mppi"):
-        policy = MppiPolicy(Mppi(MppiConfig(samples=16)))
-        policy.reset(world, np.random.default_rng(0))
-        for step in range(2):
-            policy.act(world.moved(time=10.0 * step))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from typing import Any
 
 import numpy as np
@@ -10,10 +9,7 @@ import numpy as np
 from pushplan.planners.following.plan_follower import PlanFollower
 from pushplan.planners.namo.movability import Movability
 from pushplan.planners.namo.planner import Namo
-from pushplan.planners.warm_up_worlds import warm_up_worlds
-from pushplan.world import MaxIterations, Planner, Stop, Twist, World
-
-_WARM_UP_PUSHES = 30
+from pushplan.world import Planner, Stop, Twist, World
 
 
 class NamoFollower(PlanFollower):
@@ -38,10 +34,6 @@ class NamoFollower(PlanFollower):
         self.movability = Movability(world)
         super().reset(world, rng)
 
-    def warm_up(self) -> None:
-        """See `pushplan.world.WarmsUp`."""
-        _warm_up()
-
     def act(self, world: World, observation: Any = None) -> Twist:
         """The twist for this step."""
         if self.movability is None:
@@ -62,13 +54,3 @@ def namo(planner: Planner | None = None, stop: Stop | None = None) -> NamoFollow
         stop: stop rule of each planning call.
     """
     return NamoFollower(planner, stop)
-
-
-@functools.cache
-def _warm_up() -> None:
-    """Do as for the navigator, and open a doorway that a box holds."""
-    from pushplan.planners.kernel_warmup import warm_up  # here, as it makes policies
-
-    warm_up("push-aware")
-    for world in warm_up_worlds("namo"):
-        Namo().plan(world, stop=MaxIterations(_WARM_UP_PUSHES))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import ClassVar
 
 import numpy as np
 
@@ -52,9 +51,6 @@ class PushAware:
         interaction: predicts the objects, `cautious_model` by default; a model without a compiled
             form is slow here.
     """
-
-    warm_up_iterations: ClassVar[int] = 6000
-    """After which it has used all of its kernels."""
 
     config: PushAwareConfig = field(default_factory=PushAwareConfig)
     interaction: InteractionModel = field(default_factory=cautious_model)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import ClassVar
 
 import numpy as np
 
@@ -34,9 +33,6 @@ class PredictivePublished:
         change_weight: factor on the mean squared change.
         network: predicts.
     """
-
-    warm_up_iterations: ClassVar[int] = 30
-    """After which it has used all of its kernels."""
 
     change_weight: float = 1000.0
     network: IceNetwork = field(default_factory=IceNetwork)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -41,9 +41,6 @@ class PredictiveShip:
         config: parameters.
         interaction: predicts the floes.
     """
-
-    warm_up_iterations: ClassVar[int] = 30
-    """After which it has used all of its kernels."""
 
     config: PredictiveConfig = field(default_factory=PredictiveConfig)
     interaction: IceInteraction = field(default_factory=IceInteraction)
