@@ -1,4 +1,4 @@
-"""The structure of the package in figures: size, kernels, imports between families, circles.
+"""The structure of the package in figures: size, imports between families, circles.
 
     python -m benchmarks.structure [PACKAGE_FOLDER ...] [--check]
 
@@ -9,9 +9,8 @@ only be lowered; the package may have more syntax nodes if a line of the changel
 change their number. A *name
 imported between families* is one name in an import statement from one planner family in another;
 files directly in ``planners/`` are the room's doors and belong to no family. A *circle* is a set of
-modules that import each other in a loop, imports inside functions counted too. A *kernel* is a
-function that Numba compiles. A conditional expression is *long* if it holds another one, spans
-lines or has more than 60 characters.
+modules that import each other in a loop, imports inside functions counted too. A
+conditional expression is *long* if it holds another one, spans lines or has over 60 characters.
 """
 
 from __future__ import annotations
@@ -30,7 +29,6 @@ import yaml
 
 from benchmarks.reporting import command_line
 
-MANY_ARGUMENTS = 10
 LONGEST_CHOICE = 60
 """Characters of a conditional expression that is read at a glance."""
 ROOT = Path(__file__).resolve().parent.parent
@@ -77,15 +75,6 @@ def imported(module: Module, root: str) -> Iterator[tuple[str, str]]:
         if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == root:
             for alias in node.names:
                 yield str(node.module), alias.name
-
-
-def kernels(module: Module) -> Iterator[ast.FunctionDef]:
-    """The compiled functions of a module."""
-    for node in ast.walk(module.tree):
-        if isinstance(node, ast.FunctionDef):
-            words = " ".join(ast.unparse(item) for item in node.decorator_list)
-            if any(word in words for word in ("njit", "kernel", "jit", "inline")):
-                yield node
 
 
 def packed_assignments(module: Module) -> int:
@@ -182,10 +171,8 @@ def measure(folder: Path) -> tuple[dict[str, str], list[str]]:
     """Figures of one package, and what stands behind them in words."""
     modules = read(folder)
     root = folder.name
-    compiled = [kernel for module in modules for kernel in kernels(module)]
     crossing = between_families(modules, root)
     loops = circles(modules, root)
-    wide = sum(len(kernel.args.args) >= MANY_ARGUMENTS for kernel in compiled)
     rooms = Counter[str]()
     nodes = Counter[str]()
     for module in modules:
@@ -198,8 +185,6 @@ def measure(folder: Path) -> tuple[dict[str, str], list[str]]:
         "files": str(len(modules)),
         "longest file": str(max(module.lines for module in modules)),
         "files over 300 lines": str(sum(module.lines > 300 for module in modules)),
-        "kernels": str(len(compiled)),
-        f"kernels with {MANY_ARGUMENTS} arguments or more": str(wide),
         "names imported between planner families": str(sum(crossing.values())),
         "circles": str(len(loops)),
         "assignments of a tuple to a tuple": str(sum(map(packed_assignments, modules))),

@@ -104,27 +104,23 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Share one kernel cache with the workers and the tests' processes."""
+    """Let the tests' processes find this package, and no other copy of it."""
     if not hasattr(config, "workerinput"):  # of xdist
-        os.environ["PYTHONSAFEPATH"] = "1"  # else a checkout is found, and compiled, once more
+        os.environ["PYTHONSAFEPATH"] = "1"  # else a checkout that one works in counts
         first = [str(Path(pushplan.__file__).parents[1]), os.environ.get("PYTHONPATH", "")]
         os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, first))
 
 
 def pytest_collection_finish() -> None:
-    """Collect garbage more rarely: what is imported and compiled stays, and is gone through."""
+    """Collect garbage more rarely: what is imported stays, and is gone through."""
     gc.freeze()
     gc.set_threshold(50_000, 20, 20)
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Skip what needs the extra 'learn' where it is missing; load the planners of `warm`."""
+    """Skip what needs the extra 'learn' where it is missing."""
     if "learn" in item.keywords and MISSING:
         pytest.skip(f"needs the extra 'learn' ({', '.join(MISSING)})")
-    for mark in item.iter_markers("warm"):
-        from pushplan.planners import warm_up
-
-        warm_up(*mark.args)
 
 
 def quickest(call: Callable[[], object], tries: int = 3) -> float:

@@ -54,7 +54,6 @@ def test_the_page_names_every_example():
 
 
 class TestWorlds:
-    @pytest.mark.warm("straight")
     @pytest.mark.parametrize("name", WORLDS)
     def test_the_command_line_plans_and_draws(self, name, tmp_path, capsys):
         picture = tmp_path / "plan.png"
@@ -164,7 +163,6 @@ class TestStudies:
         assert all(0.0 < speed <= 0.15 for speed in speeds)
 
 
-@pytest.mark.warm("straight")
 def test_the_metric_is_one_of_an_episode():
     metric = runpy.run_path(str(EXAMPLES / "my_metric.py"))["mean_speed"]
     scenario = suite("maze-2d-3").scenarios[0]

@@ -67,7 +67,6 @@ def without(absent, code: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-@pytest.mark.warm("straight")
 def test_a_robot_needs_none_of_the_extras():
     done = without(EXTRAS, ROBOT)
     assert done.returncode == 0, done.stderr

@@ -53,7 +53,7 @@ CASES = {
 }
 EACH_ALONE = """
 import contextlib, io, json, os, sys
-import numba, scipy.ndimage, scipy.sparse, shapely  # once for all, they take most of the time
+import scipy.ndimage, scipy.sparse, shapely  # once for all, they take most of the time
 for name, code in json.load(sys.stdin).items():
     if os.fork() == 0:
         said = io.StringIO()

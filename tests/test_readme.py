@@ -110,7 +110,6 @@ def test_a_room_is_planned_in(folder, monkeypatch, capsys) -> None:
 
 
 @pytest.mark.usefixtures("cpu_time")
-@pytest.mark.warm("push-aware")
 def test_its_deadline_holds() -> None:
     (seconds,) = re.findall(r"Deadline\((.*?)\)", block("load_world"))
     (name,) = re.findall(r'make_planner\("(.*?)"\)', block("load_world"))

@@ -38,7 +38,7 @@ def compare(concentration: float, scenes: int) -> None:
         path = np.column_stack(
             [x + along * np.cos(theta), y + along * np.sin(theta), np.full(STEPS, theta)]
         )
-        work += [model.sweep(world, path).work for model in models]  # and loads the kernels
+        work += [model.sweep(world, path).work for model in models]
         for times in seconds:
             for i, model in enumerate(models):
                 began = time.process_time()

@@ -97,7 +97,7 @@ def main() -> None:
 
 
 def make_warm() -> World:
-    """Any world, so that compilation is not timed."""
+    """Any world, so that no import is timed."""
     env = make(Scenario("maze"), observation="state")
     env.reset(seed=0)
     return env.world

@@ -18,7 +18,7 @@ from benchmarks.reporting import command_line
 from pushplan.envs import RolloutInteraction
 from pushplan.envs.simulators.base import Materials
 from pushplan.envs.tasks.ship_ice import ShipIceTask
-from pushplan.planners import make_planner, warm_up
+from pushplan.planners import make_planner
 from pushplan.world import Planner, World, stream
 
 NAMES = (
@@ -48,7 +48,6 @@ def main() -> None:
     parser.add_argument("--fields", type=int, default=20)
     parser.add_argument("--planners", nargs="*", choices=NAMES, default=list(NAMES))
     options = parser.parse_args()
-    warm_up(*options.planners)
     sys.stdout.write(
         "| ice | planner | CPU median [ms] | CPU p95 | wall median | iterations "
         "| mean length [m] | mean work [kg m] |\n|---|---|---|---|---|---|---|---|\n"

@@ -42,7 +42,7 @@ import numpy as np
 from benchmarks.reporting import command_line
 from pushplan.control import MpcTracker, PathFollower
 from pushplan.envs import make
-from pushplan.planners import make_planner, warm_up
+from pushplan.planners import make_planner
 from pushplan.scenarios import Scenario
 from pushplan.world import (
     Controller,
@@ -179,7 +179,6 @@ def deadlines(names: list[str], calls: int) -> None:
         "|---|---|---|---|---|---|---|---|---|",
     )
     for name in names:
-        warm_up(name)
         planner = make_planner(name)
         worlds = starts(name, 10)
         for world in worlds:
@@ -205,7 +204,6 @@ def any_world(names: list[str], calls: int, count: int) -> None:
     write(f"CPU time with a deadline of {1e3 * BUDGET_S:.0f} ms, {calls} {worlds} [ms]", "")
     write("| planner | p50 | p99 | p99.9 | worst | over 65 ms |", "|---|---|---|---|---|---|")
     for name in names:
-        warm_up(name)
         planner = make_planner(name)
         took = np.empty(calls)
         for seed in range(-min(_FIRST, calls), calls):
@@ -295,7 +293,6 @@ def memory(names: list[str], calls: int, controllers: bool) -> None:
     )
     stop = MaxIterations(20)
     for name in names:
-        warm_up(name)
         planner = make_planner(name)
         worlds = starts(name, 5, small=True)
 

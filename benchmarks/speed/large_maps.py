@@ -3,7 +3,7 @@
     python -m benchmarks.speed.large_maps [CALLS] [--planner NAME] [--case NAME]
     python -m benchmarks.speed.large_maps [CALLS] --figure docs/images/large-maps.png
 
-CPU time of a call that ends with its first plan, kernels loaded. "new map" is the first call on a
+CPU time of a call that ends with its first plan. "new map" is the first call on a
 map that no planner has seen; "same map" are later calls from and to other places.
 """
 
@@ -18,7 +18,7 @@ import shapely
 from benchmarks.reporting import command_line
 from pushplan.drawing.figure import COLUMN, DPI, STYLE
 from pushplan.drawing.palette import DASHES, MARKERS
-from pushplan.planners import make_planner, warm_up
+from pushplan.planners import make_planner
 from pushplan.world import (
     Deadline,
     FirstSolution,
@@ -209,8 +209,6 @@ def main() -> None:
     parser.add_argument("--figure")
     options = parser.parse_args()
     planners = options.planner or PLANNERS
-    for name in planners:
-        warm_up(name)
     if options.figure:
         return draw_growth(options.figure, planners, options.calls)
     print("| map | planner | new map: median / p95 / worst [ms] | same map |\n|---|---|---|---|")

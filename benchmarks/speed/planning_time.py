@@ -2,7 +2,7 @@
 
     python -m benchmarks.speed.planning_time [--scenes 100] [--calls 1000]
 
-On scenarios of the suites maze-2d-3, -5 and -10. Kernels are compiled before anything is timed.
+On scenarios of the suites maze-2d-3, -5 and -10.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ import numpy as np
 
 from benchmarks.reporting import command_line, head, origin, percentiles, row, write
 from pushplan.envs import make
-from pushplan.planners import make_planner, warm_up
+from pushplan.planners import make_planner
 from pushplan.planners.push_aware import PushAware
 from pushplan.scenarios import suite
 from pushplan.world import (
@@ -56,7 +56,6 @@ def worlds(name: str, count: int, seed: int) -> list[World]:
 
 def anytime(names: list[str], count: int, seed: int, longest: float, clock: Clock) -> None:
     """Cost after a time over the cost after the longest, and the time of the first plan."""
-    warm_up("push-aware", "kinodynamic-rrt")
     planner = make_planner("push-aware")
     assert isinstance(planner, PushAware)
     write("First plan [ms], one call each:\n")

@@ -7,8 +7,8 @@ one. Here, one thread receives worlds and another one asks for commands, as on a
 
 Per policy it writes how long `Runner.command` took (median, 99.9th percentile and worst), how much
 of that the thread computed itself at worst (the rest is the machine doing other work), how many
-commands were late, what was compiled after `start`, by how much memory grew from a tenth of the
-time to half of it and from there to the end, and how the episodes ended. With --kill a planning
+commands were late, by how much memory grew from a tenth of the time to half of it and from there to
+the end, and how the episodes ended. With --kill a planning
 thread is ended now and then in the middle of its call, by an exception that no planner catches.
 With --realtime the loop and the simulator have real-time priorities, as on a robot, so that other
 work on the machine delays them less; planning has none. That needs the right to set priorities.
@@ -27,7 +27,6 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 import numpy as np
-from pushplan.compiled import watching
 
 from benchmarks.reporting import command_line, resident_mb
 from pushplan.runtime import Runner
@@ -58,10 +57,10 @@ def main() -> None:
     parser.add_argument("--policies", nargs="+", default=list(SUITES), choices=list(SUITES))
     options = parser.parse_args()
     print(
-        "| policy | suite | commands | median | p99.9 | worst | own worst | late | compiled | "
+        "| policy | suite | commands | median | p99.9 | worst | own worst | late | "
         "memory | killed | failures | episodes |"
     )
-    print("|---" * 13 + "|")
+    print("|---" * 12 + "|")
     for policy in options.policies:
         print(row(policy, options), flush=True)
 
@@ -91,7 +90,6 @@ def row(policy: str, options: argparse.Namespace) -> str:
         *(f"{value:.2f} ms" for value in (np.median(took), np.quantile(took, 0.999), took.max())),
         f"{own.max():.2f} ms",
         str(loop.late),
-        str(len(loop.compiled)),
         ", ".join(f"{mb:+.1f}" for mb in np.diff(loop.memory)) + " MB",
         str(killer.killed),
         str(loop.failures),
@@ -113,7 +111,6 @@ class _Loop:
         self._kill = kill
         self.took: list[float] = []
         self.own: list[float] = []
-        self.compiled: list[str] = []
         self.reasons: Counter[str] = Counter()
         self.late = self.failures = 0
         self.memory: list[float] = []
@@ -129,8 +126,7 @@ class _Loop:
         self._pipe.send(self._socket.getsockname()[1])
         self._begin()
         threading.Thread(target=self._receive, daemon=True).start()
-        with watching(lambda kernel, loaded: self.compiled.append(kernel)):
-            self._drive(seconds, there)
+        self._drive(seconds, there)
         self.failures += self.runner.failures
         self.runner.close(20.0)
 

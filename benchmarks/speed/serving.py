@@ -24,7 +24,7 @@ from serve_client import PolicyClient
 
 from benchmarks.reporting import command_line, median_ms
 from pushplan.files.safe_files import parse_json
-from pushplan.planners import make_policy, warm_up
+from pushplan.planners import make_policy
 from pushplan.serving import PolicyServer
 from pushplan.world import (
     GoalDisc,
@@ -124,7 +124,6 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=2000)
     parser.add_argument("--server", help="address of a server in another process")
     options = parser.parse_args()
-    warm_up(options.policy)
     print(f"{'act of ' + options.policy:40} {'median':>9} {'99 %':>9} {'worst':>9} ms")
     with tempfile.TemporaryDirectory() as folder:
         path = f"unix:{os.path.join(folder, 's')}"

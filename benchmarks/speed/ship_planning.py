@@ -18,7 +18,7 @@ from pushplan.envs.tasks.ship_ice import ShipIceTask
 from pushplan.motion.speed_profile import turning_radius
 from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
 from pushplan.motion.state_lattice.lattice_search import open_search
-from pushplan.planners import make_planner, warm_up
+from pushplan.planners import make_planner
 from pushplan.planners.ship_lattice import ShipLatticeConfig
 from pushplan.planners.ship_lattice.floe_costs import floe_costs
 from pushplan.world import Planner, World, stream
@@ -31,7 +31,6 @@ ICE = (10, 20, 30, 40, 50)
 
 def times(shares: Sequence[int], fields: int, seed: int) -> None:
     """Times of planning calls and node rates."""
-    warm_up(*TIMED)
     write("Times in ms: median of the first path; median / p95 / p99 / worst of whole calls.\n")
     head("goal, ice", "planner", *COLUMNS)
     for distance in (8.0, 38.0):

@@ -1,117 +1,81 @@
-"""What compilation costs: CPU time from an empty cache, and time until ready with a full one.
+"""What the first use of a policy costs: a process of its own imports it, and makes a decision.
 
-    python -m benchmarks.speed.startup [NAME ...] [--write]
+    python -m benchmarks.speed.startup [--policies NAME ...] [--seed SEED]
 
-Each figure is of a process of its own that imports pushplan and calls `warm_up(NAME)`; `everything`
-is `pushplan compile`. With ``--write`` nothing is measured: the names of the kernels that
-`pushplan compile NAME` makes ready go into the package, for the names given or else for all, so
-that its progress knows how many are to come.
+A line gives medians of five processes: CPU time of ``import``, of the first ``act`` (for a planner
+with its first plan) and of the whole process, which also reads the world from a file, and the most
+memory that the process had. The world is a start of a suite of the policy's task.
 """
 
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from typing import Any
 
-from benchmarks.reporting import command_line
+import numpy as np
 
-_NAMES = ("straight", "kinodynamic-rrt", "push-aware", "greedy", "gtsp-mpc", "ship-lattice")
-_EVERYTHING = "everything"
-_MANIFEST = Path(__file__).parents[2] / "pushplan" / "cli" / "kernel_names.json"
+from benchmarks.reporting import command_line, head, row
+from pushplan.evaluation import JobSettings
+from pushplan.planners import make_policy
+from pushplan.scenarios import suite
+from pushplan.world import save_world
+
+SUITES = {
+    "straight": "maze-2d-5",
+    "kinodynamic-rrt": "maze-2d-5",
+    "push-aware": "maze-2d-5",
+    "greedy": "area-clearing-2d-10",
+    "gtsp-mpc": "area-clearing-2d-10",
+    "ship-lattice": "ship-ice-2d-20",
+    "ship-predictive": "ship-ice-2d-20",
+}
+_PROCESSES = 5
 _SCRIPT = """
-import json, sys, time
-began, busy = time.perf_counter(), time.process_time()
-from pushplan.compiled import watching
-kernels = set()
-with watching(lambda kernel, loaded: kernels.add(kernel)):
-    if sys.argv[1] == "everything":
-        from pushplan.evaluation.run.warmup import names, warm_up
-        for name in names():
-            warm_up(name)
-    else:
-        from pushplan.planners import warm_up
-        warm_up(sys.argv[1])
-print(json.dumps([time.process_time() - busy, time.perf_counter() - began, len(kernels)]))
-"""
-_KERNELS = """
-import json, sys
-from pushplan.compiled import watching
-from pushplan.evaluation.run.warmup import warm_up
-kernels = set()
-with watching(lambda kernel, loaded: kernels.add(kernel)):
-    warm_up(sys.argv[1])
-print(json.dumps(sorted(kernels)))
+import json, resource, sys, time
+began = time.process_time()
+from pushplan.planners import make_policy
+policy = make_policy(sys.argv[1])
+imported = time.process_time()
+import numpy as np
+from pushplan.world import load_world
+world = load_world(sys.argv[2])
+read = time.process_time()
+policy.reset(world, np.random.default_rng(0))
+policy.act(world)
+decided = time.process_time()
+memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+print(json.dumps([imported - began, decided - read, decided, memory]))
 """
 
 
-def measure(name: str, cache: str) -> tuple[float, float, int]:
-    """Warm up in a new process.
-
-    Returns:
-        CPU time [s], time [s] and how many kernels Python called.
-    """
-    busy, took, kernels = _last_line(_SCRIPT, name, {"NUMBA_CACHE_DIR": cache})
-    return busy, took, kernels
-
-
-def write_kernel_names(only: list[str]) -> None:
-    """Write down which kernels each name of `pushplan compile` makes ready.
-
-    Args:
-        only: the names that are looked at; what is written of the others stays. All if empty.
-    """
-    from pushplan.evaluation.run.warmup import names
-
-    kernels: dict[str, list[str]] = {name: [] for name in names()}
-    for users, shared in json.loads(_MANIFEST.read_text()).items():
-        for name in set(users.split()) & set(kernels) - set(only or kernels):
-            kernels[name] += shared
-    for name in only or list(kernels):
-        kernels[name] = _last_line(_KERNELS, name, {})
-    _write(kernels)
-
-
-def _write(kernels: dict[str, list[str]]) -> None:
-    """One line for each set of kernels that some names, and no others, make ready."""
-    by_names: dict[str, list[str]] = {}
-    for kernel in sorted(set().union(*kernels.values())):
-        users = " ".join(name for name in kernels if kernel in kernels[name])
-        by_names.setdefault(users, []).append(kernel)
-    _MANIFEST.write_text(json.dumps(by_names, indent=1) + "\n")
-
-
-def _last_line(script: str, name: str, settings: dict[str, str]) -> Any:
-    done = subprocess.run(
-        [sys.executable, "-c", script, name],
-        env={**os.environ, **settings},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    return json.loads(done.stdout.splitlines()[-1])
+def measure(policy: str, seed: int) -> np.ndarray:
+    """CPU time of import, of the first decision and of the process [s], and memory [MB]."""
+    (scenario,) = suite(SUITES[policy], episodes=1, first_seed=seed).scenarios
+    env = JobSettings().environment(scenario, make_policy(policy))
+    env.reset(seed=seed)
+    found = []
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "world.json")
+        save_world(env.world, path)
+        command = [sys.executable, "-c", _SCRIPT, policy, str(path)]
+        for _ in range(_PROCESSES):
+            done = subprocess.run(command, capture_output=True, text=True, check=True)
+            found.append(json.loads(done.stdout))
+    return np.median(found, axis=0)
 
 
 def main() -> None:
-    """Print the table, or write the names."""
-    parser = command_line(__doc__)
-    parser.add_argument("names", nargs="*")
-    parser.add_argument("--write", action="store_true", help="write the names of the kernels")
+    """Measure, print the table."""
+    parser = command_line(__doc__, seed=1000)
+    parser.add_argument("--policies", nargs="+", default=list(SUITES), choices=list(SUITES))
     options = parser.parse_args()
-    if options.write:
-        write_kernel_names(options.names)
-        return
-    print("| policy | kernels | cold [s of CPU] | warm [s of CPU] | warm [s] |")
-    print("|---|---|---|---|---|")
-    for name in options.names or (*_NAMES, _EVERYTHING):
-        with tempfile.TemporaryDirectory() as cache:
-            cold, _, kernels = measure(name, cache)
-            busy, took, _ = measure(name, cache)
-        print(f"| {name} | {kernels} | {cold:.1f} | {busy:.1f} | {took:.1f} |", flush=True)
+    head("policy", "import [s of CPU]", "first decision [s]", "process [s]", "memory [MB]")
+    for policy in options.policies:
+        imported, decided, whole, memory = measure(policy, options.seed)
+        row(policy, f"{imported:.2f}", f"{decided:.2f}", f"{whole:.2f}", f"{memory:.0f}")
 
 
 if __name__ == "__main__":

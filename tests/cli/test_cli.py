@@ -21,7 +21,6 @@ COMMANDS = (
     "list",
     "score",
     "report",
-    "compile",
     "ice",
     "teleop",
 )
@@ -59,7 +58,7 @@ def test_help_has_examples(command: str, capsys: pytest.CaptureFixture[str]) -> 
 def test_help_loads_nothing_heavy() -> None:
     code = (
         "import sys; from pushplan.cli import main; main(['--help']);"
-        "print([m for m in ('numpy', 'numba', 'scipy', 'rich') if m in sys.modules])"
+        "print([m for m in ('numpy', 'scipy', 'rich') if m in sys.modules])"
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert out.stdout.splitlines()[-1] == "[]"

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import importlib
 import json
 import re
 import sys
 from pathlib import Path
 
 import pytest
-from pushplan.cli.kernel_progress import PendingKernels, expected_kernels
 
 from pushplan.cli import build_parser, main
 from pushplan.cli.doctor import BASE
@@ -61,7 +59,6 @@ USERS_MISTAKES = {
         ["export", "--policy", "straight", "--task", "maze"],
         [*"export --policy straight --task maze --episodes 1 --out FILE/run".split()],
     ],
-    "compile": [["nobody"]],
 }
 
 
@@ -171,7 +168,6 @@ def test_doctor(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPa
     assert main(["doctor", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert set(found["libraries"]) == {*BASE, *EXTRAS}
-    assert found["kernels"]["known"] >= found["kernels"]["compiled"] >= 0
     monkeypatch.setitem(sys.modules, "pymunk", None)
     monkeypatch.setattr(
         "pushplan.cli.doctor.find_spec", lambda name: None if name == "pymunk" else object()
@@ -185,22 +181,6 @@ def test_at_most_three_near_names(count: int) -> None:
     text = unknown_name_message("suite", "maze-9", [f"maze-{k}" for k in range(count)])
     nearest = text.partition("nearest of")[2]
     assert len(re.findall(r"maze-\d", nearest)) in (0, 3)
-
-
-def test_kernels_that_a_worker_compiles_are_told_of() -> None:
-    fcntl = pytest.importorskip("fcntl")
-    from pushplan.planners.ship_lattice import ShipLattice  # noqa: F401
-
-    pending = PendingKernels("ship-lattice", "somebody-elses.py:Policy")
-    assert str(pending) == ""
-    module, _, name = min(expected_kernels("ship-lattice")).rpartition(".")
-    cache = getattr(importlib.import_module(module), name).cache
-    path = Path(cache.cache_path) / f"{cache._stem}.lock"
-    with path.open("a") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        assert re.fullmatch(r"compiling kernels, about [\d.]+ \w+ at most, once", str(pending))
-    pending.finish()
-    assert str(pending) == ""
 
 
 @pytest.mark.slow

@@ -70,13 +70,3 @@ def test_identity_follows_the_code_and_not_the_place(tmp_path: Path) -> None:
     assert parse_policy(f"{one}:Lazy").identity != before
     with_option = PolicySpec("p", functools.partial(plain_policy, speed=2.0))
     assert with_option.identity != PolicySpec("p", plain_policy).identity
-
-
-def test_only_planners_of_ours_are_warmed_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    import pushplan.planners
-
-    asked = []
-    monkeypatch.setattr(pushplan.planners, "warm_up", asked.append)
-    for given in ("skeleton", f"{HERE}:Ahead", Ahead, "maze-ppo", "gtsp-mpc"):
-        parse_policy(given).warm_up()
-    assert asked == ["skeleton", "gtsp-mpc"]

@@ -34,7 +34,6 @@ class Looks(Stop):
         return check
 
 
-@pytest.mark.warm(*PLANNERS)
 def test_what_is_made_of_a_large_map_is_made_in_pieces():
     looks, world = Looks(), posts(3000, seed=12)
     assert make_planner("skeleton").plan(world, stop=looks).status is PlanStatus.PATH_ONLY
@@ -45,7 +44,6 @@ def test_what_is_made_of_a_large_map_is_made_in_pieces():
     assert looks.count >= 9
 
 
-@pytest.mark.warm(*PLANNERS)
 @pytest.mark.parametrize("name", PLANNERS)
 def test_a_call_ends_at_the_look_that_fires(name):
     for last in (1, 2, 4, 7, 9):
@@ -63,7 +61,6 @@ def test_the_coarse_path_looks_while_it_goes_through_the_cells():
     assert not len(coarse_path(posts(300, seed=1), 1.0, lambda: True))
 
 
-@pytest.mark.warm("straight")
 def test_what_was_made_before_a_stop_is_kept_for_the_next_call():
     world, planner = posts(3000, seed=7), make_planner("straight")
     clearance = world.robot.circumscribed_radius
@@ -73,7 +70,6 @@ def test_what_was_made_before_a_stop_is_kept_for_the_next_call():
     assert prepare_contours(world.static, clearance, lambda: True)
 
 
-@pytest.mark.warm("namo")
 def test_namo_looks_while_it_makes_its_grid():
     world = posts(150, seed=3, planner="namo")
     assert suits_keyholes(world, KeyholeConfig())

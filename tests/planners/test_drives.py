@@ -91,7 +91,6 @@ def drive(world: World, policy, seconds: float, period: float = 0.1) -> tuple[Wo
     return world, twists
 
 
-@pytest.mark.warm(*PLANNERS)
 @pytest.mark.parametrize("name", PLANNERS)
 @pytest.mark.parametrize("kind", ROBOTS)
 def test_plans_for_every_kind_of_robot_keep_its_turning_radius(kind, name):
@@ -108,7 +107,6 @@ def test_plans_for_every_kind_of_robot_keep_its_turning_radius(kind, name):
         assert curvature.max() <= 1.0 / RADIUS + 1e-6
 
 
-@pytest.mark.warm("push-aware")
 def test_a_car_that_reverses_backs_off_from_a_wall_that_it_overlaps():
     """No plan begins there."""
     world = make_u_maze([], robot=ROBOTS["car that reverses"])
@@ -148,7 +146,6 @@ def test_a_plan_is_driven_in_stages_ahead_back_and_on_the_spot():
     assert progress.index(along[-1]) == 6
 
 
-@pytest.mark.warm(*PLANNERS)
 @pytest.mark.parametrize("name", PLANNERS)
 def test_a_robot_that_faces_a_wall_plans_to_turn_on_the_spot_first(name):
     """No arc leads on from there; the corners of the robot push the box beside it."""
@@ -167,7 +164,6 @@ def test_a_robot_that_faces_a_wall_plans_to_turn_on_the_spot_first(name):
     assert swept.work == pytest.approx(plan.interaction_cost, rel=1e-3)
 
 
-@pytest.mark.warm("push-aware")
 def test_a_robot_that_faces_away_turns_on_the_spot_rather_than_driving_round():
     robot = make_robot(drive=Drive.DIFFERENTIAL)
     world = make_u_maze([], robot=robot, robot_pose=[11.25, 3.75, -np.pi / 2])
@@ -180,7 +176,6 @@ def test_a_robot_that_faces_away_turns_on_the_spot_rather_than_driving_round():
     assert max(costs) < 1.02 * min(costs)
 
 
-@pytest.mark.warm(*PLANNERS)
 @pytest.mark.parametrize("name", PLANNERS)
 def test_a_car_that_faces_a_wall_plans_to_reverse_where_it_can(name):
     car = ROBOTS["car that reverses"]
@@ -197,7 +192,6 @@ def test_a_car_that_faces_a_wall_plans_to_reverse_where_it_can(name):
     assert "no room ahead" in blocked.status.remedy
 
 
-@pytest.mark.warm("kinodynamic-rrt")
 @pytest.mark.parametrize("controller", [PathFollower, PurePursuit, MpcTracker])
 @pytest.mark.parametrize(
     ("kind", "pose"), [("disc", NEAR_A_WALL), ("car that reverses", FACING_A_WALL)]
@@ -214,7 +208,6 @@ def test_turns_on_the_spot_and_reverse_arcs_are_driven_to_the_goal(kind, pose, c
     assert first.linear < 0.0 if robot.drive is Drive.CAR else first == Twist(0.0, first.angular)
 
 
-@pytest.mark.warm("push-aware")
 @pytest.mark.parametrize(
     ("kind", "controller"),
     [

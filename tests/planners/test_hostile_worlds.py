@@ -38,8 +38,6 @@ from pushplan.world import (
 )
 from pushplan.world.outline import transform
 
-pytestmark = pytest.mark.warm("kinodynamic-rrt", "push-aware")
-
 SOON = FirstSolution() | MaxIterations(20_000)
 SQUARE = 0.5 * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
 

@@ -73,9 +73,7 @@ def random_start(seed: int, name: str) -> World:
 
 
 @pytest.mark.parametrize("count", COUNTS)
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.warm(name)) for name in planner_names()]
-)
+@pytest.mark.parametrize("name", planner_names())
 def test_every_plan_keeps_every_limit_of_the_robot(name: str, count: int) -> None:
     found, wrong = 0, []
     for seed in range(count):

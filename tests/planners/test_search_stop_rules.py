@@ -60,9 +60,7 @@ def test_all_planners_are_here():
     assert {*MAZE, *SHIP} == set(PLANNERS)
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.warm(name)) for name in planner_names()]
-)
+@pytest.mark.parametrize("name", planner_names())
 class TestEveryPlanner:
     def test_the_same_iterations_give_the_same_bytes(self, name):
         assert digest(name) == digest(name)

@@ -24,14 +24,12 @@ from pushplan.world import (
     World,
 )
 
-pytestmark = pytest.mark.warm("push-aware", "kinodynamic-rrt")
-
 CHANCE = ("geometric-rrt", "kinodynamic-rrt", "push-aware", "namo")
 """Planners that draw places between the bounds: turned, they draw others."""
 AS_PUBLISHED = "ship-lattice-published"
 """Its cost adds kilograms to metres, so that another unit of length gives another path."""
 ITERATIONS = {"ship-predictive-published": 40}
-PLANNERS = [pytest.param(name, marks=pytest.mark.warm(name)) for name in planner_names()]
+PLANNERS = planner_names()
 COUNTS = [6, pytest.param(150, marks=pytest.mark.slow)]
 FEW = [3, pytest.param(40, marks=pytest.mark.slow)]
 

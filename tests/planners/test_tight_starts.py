@@ -89,7 +89,6 @@ FEW = [
 ]
 
 
-@pytest.mark.warm(*PLANNERS)
 @pytest.mark.parametrize(("robot", "walls", "part", "goal"), FEW)
 def test_a_differential_drive_backs_out_of_a_tight_start(robot, walls, part, goal):
     world = boxed_in(ROBOTS[robot], walls, part, goal)
@@ -99,7 +98,6 @@ def test_a_differential_drive_backs_out_of_a_tight_start(robot, walls, part, goa
         check_plan(world, result.plan, result.status)
 
 
-@pytest.mark.warm(*PLANNERS)
 def test_it_backs_out_between_objects_and_moves_none_where_it_can():
     world = boxed_in(ROBOTS["burger"], "front", 0.0, "behind")
     size = 0.3 * box(-1, -1, 1, 1)
@@ -115,7 +113,6 @@ def test_it_backs_out_between_objects_and_moves_none_where_it_can():
         assert moved <= 1e-9
 
 
-@pytest.mark.warm(*PLANNERS)
 @pytest.mark.parametrize("name", PLANNERS[:2])
 def test_a_robot_that_nothing_gets_away_is_said_to_be_blocked_at_once(name):
     stuck = boxed_in(replace(ROBOTS["burger"], min_speed=0.0), "pocket", 0.05, "behind")

@@ -188,7 +188,6 @@ SCHEMAS = {
 }
 
 
-@pytest.mark.warm("straight")
 def test_a_runner_is_logged_and_scored(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, world = tmp_path / "log.mcap", make_u_maze()
     with McapLog(path) as log, Runner("straight", period=0.1, log=log) as runner:

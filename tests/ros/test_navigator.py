@@ -158,7 +158,6 @@ def test_a_goal_that_comes_before_the_map_or_the_odometry_is_refused():
         scene.take_map(pose(0, 0))
 
 
-@pytest.mark.warm("straight")
 def test_a_path_is_driven_to_its_end():
     robot = Robot()
     robot.navigator.follow(robot.path(3.0, 0.75))
@@ -169,7 +168,6 @@ def test_a_path_is_driven_to_its_end():
     assert max(step.twist.linear for step in said) > 0.2
 
 
-@pytest.mark.warm("straight")
 def test_another_path_is_taken_up_without_a_stop():
     robot = Robot()
     robot.navigator.follow(robot.path(3.0, 0.75))
@@ -184,7 +182,6 @@ def test_another_path_is_taken_up_without_a_stop():
     assert math.dist(robot.pose[:2], (3.0, 2.2)) <= 0.1
 
 
-@pytest.mark.warm("straight")
 def test_a_policy_drives_on_plans_of_its_own():
     robot = Robot()
     path = robot.path(3.0, 0.75)
@@ -196,7 +193,6 @@ def test_a_policy_drives_on_plans_of_its_own():
     assert [step.twist.linear for step in said[40:80]] != [0.0] * 40
 
 
-@pytest.mark.warm("straight")
 @pytest.mark.parametrize(
     ("outcome", "options"),
     [
@@ -218,7 +214,6 @@ def test_the_robot_brakes_before_a_goal_ends_early(outcome, options):
     assert not robot.navigator.is_driving
 
 
-@pytest.mark.warm("straight")
 def test_odometry_that_comes_in_while_a_path_is_taken_up_does_not_end_it() -> None:
     robot = Robot()
     robot.navigator.follow(robot.path(1.0, 1.5))
@@ -239,7 +234,6 @@ def test_odometry_that_comes_in_while_a_path_is_taken_up_does_not_end_it() -> No
     assert math.dist(robot.pose[:2], (3.0, 2.2)) <= 0.1
 
 
-@pytest.mark.warm("straight")
 def test_a_path_that_is_refused_leaves_the_old_one():
     robot = Robot()
     path = robot.path(3.0, 0.75)
@@ -312,7 +306,6 @@ def test_a_path_that_passes_its_own_end_is_driven_to_its_end(shape, stamp):
 BLOCK = (slice(24, 37), slice(40, 44))  # x 2 to 2.2 m, y 1.2 to 1.85 m
 
 
-@pytest.mark.warm("straight")
 @pytest.mark.parametrize("controller", ["", "straight"])
 def test_a_robot_stops_or_drives_around_what_comes_into_its_path(controller):
     path, _ = given_path([(0.5, 1.5), (3.5, 1.5)])
@@ -359,7 +352,6 @@ def test_names_of_nav2s_own_files_stand_for_what_is_configured():
     assert robot.drive()[-1].outcome == "SUCCEEDED"
 
 
-@pytest.mark.warm("straight")
 def test_a_controller_is_loaded_beside_the_robots_loop():
     robot, held = Robot(), threading.Event()
     load = robot.navigator._load_controller

@@ -246,7 +246,6 @@ def test_no_robot_touches_what_comes_into_its_way_where_it_could_brake(
         assert driven.overlap(driven.world.static.polygons[0]) == 0.0
 
 
-@pytest.mark.warm("straight")
 @pytest.mark.parametrize("name", ["straight", pytest.param("push-aware", marks=pytest.mark.slow)])
 def test_a_robot_drives_around_a_pillar_that_has_come_into_its_way(name: str) -> None:
     driven = DrivenRobot(name, room())
@@ -258,7 +257,6 @@ def test_a_robot_drives_around_a_pillar_that_has_come_into_its_way(name: str) ->
     assert max(speeds) == pytest.approx(0.8)
 
 
-@pytest.mark.warm("straight")
 def test_before_a_door_that_shuts_the_robot_waits_with_a_reason_until_it_opens() -> None:
     door, sides = wall(5.0, 2.2, 3.8), (wall(5.0, 0.0, 2.2), wall(5.0, 3.8, 6.0))
     opened = adding(room(), *sides)
@@ -275,7 +273,6 @@ def test_before_a_door_that_shuts_the_robot_waits_with_a_reason_until_it_opens()
         assert driven.drive(600).status is CommandStatus.DONE
 
 
-@pytest.mark.warm("push-aware")
 @pytest.mark.parametrize("name", [pytest.param("push-aware", marks=pytest.mark.slow), "straight"])
 def test_an_object_that_turns_out_fixed_is_an_obstacle(name: str) -> None:
     objects = Movables.from_outlines([SQUARE], [[5.0, 3.0, 0.0]], masses=[0.01])
@@ -307,7 +304,6 @@ def test_what_was_there_at_the_start_is_left_to_the_policy() -> None:
     assert driven.overlap(block) > 0.0
 
 
-@pytest.mark.warm("straight")
 def test_a_map_that_is_perceived_anew_each_time_costs_no_plan(monkeypatch) -> None:
     rng = np.random.default_rng(0)
     exact = DrivenRobot.seen

@@ -28,7 +28,7 @@ class Watched(PlanFollower):
 
     def plan(self, world, *, stop=None, rng=None):
         with self.inside:
-            if not in_robots_loop():  # the kernels are loaded in this one
+            if not in_robots_loop():  # as `Runner` asks
                 self.rules.append(stop)
                 self.entered.set()
                 self.hold.wait(20.0)

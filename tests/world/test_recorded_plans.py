@@ -80,7 +80,6 @@ def test_wrong_plans_are_refused(changes: dict[str, object], rule: str) -> None:
         RecordedPlans(**{**good, **changes})  # type: ignore[arg-type]
 
 
-@pytest.mark.warm("push-aware")
 def test_an_episode_keeps_its_plans_through_a_file(tmp_path: Path) -> None:
     (scenario,) = suite("maze-2d-5", episodes=1).scenarios
     env = make(scenario)

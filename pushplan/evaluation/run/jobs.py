@@ -78,9 +78,8 @@ class JobSettings(CheckedFields):
             `ChoosesObservation` asks for, else ``"state"``.
         timeout_s: wall-clock limit of one job [s], None for none.
         grace_s: how much later a job is ended by force [s].
-        dry_run: in each process, warm up a planner of ours before its first job, and run the
-            first steps of a policy's first job once without recording them, so that loading and
-            compiling are in nobody's planning times.
+        dry_run: in each process, run the first steps of a policy's first job once without
+            recording them, so that the loading of libraries is in nobody's planning times.
         latency_factor: seconds of the world's clock for each second that a policy computes; None
             for a world that stands still meanwhile. See `run_episode`.
     """

@@ -36,8 +36,6 @@ from pushplan.world import (
     stream,
 )
 
-pytestmark = pytest.mark.warm("namo")
-
 ENOUGH = MaxIterations(700)
 SQUARE = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
 

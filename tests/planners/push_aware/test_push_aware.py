@@ -40,8 +40,6 @@ from pushplan.world import (
 )
 from pushplan.world.outline import transform
 
-pytestmark = pytest.mark.warm("push-aware")
-
 
 def generator(seed: int) -> np.random.Generator:
     return np.random.default_rng(seed)

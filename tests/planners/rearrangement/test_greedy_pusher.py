@@ -115,7 +115,6 @@ def test_it_delivers_most_boxes_and_the_same_each_time():
     )
 
 
-@pytest.mark.warm("greedy")
 def test_commands_are_within_limits_and_quick():
     world = scene([(0.0, 0.0, 0.3), (2.0, -4.49, 0.0), (-4.49, 4.0, 0.0)])
     policy = GreedyPusher()

@@ -17,7 +17,6 @@ from pushplan.scenarios import suite
 from pushplan.world import InvalidInputError, ShowsPlan, World
 
 
-@pytest.mark.warm("gtsp-mpc")
 def test_gtsp_mpc_shows_the_push_in_hand() -> None:
     (scenario,) = suite("area-clearing-2d-10", episodes=1, first_seed=3).scenarios
     env = make(scenario, action="velocity")
@@ -76,7 +75,6 @@ def _first_choice(*costs: object) -> GtspMpc:
     return policy
 
 
-@pytest.mark.warm("gtsp-mpc")
 def test_a_term_of_a_user_changes_the_choice_of_pushes() -> None:
     plain = _first_choice()
     first = plain.plan[0].delivers
@@ -92,7 +90,6 @@ def test_a_term_of_a_user_changes_the_choice_of_pushes() -> None:
     assert [push.delivers for push in same.plan] == [push.delivers for push in plain.plan]
 
 
-@pytest.mark.warm("gtsp-mpc")
 @pytest.mark.parametrize("wrong", ["cheap", lambda world, push: "1", lambda world, push: math.nan])
 def test_terms_that_are_no_costs_are_one_clear_line(wrong: object) -> None:
     with pytest.raises(InvalidInputError, match="cost"):

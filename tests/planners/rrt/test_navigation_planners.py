@@ -36,8 +36,6 @@ from pushplan.world import (
 )
 from pushplan.world.outline import transform
 
-pytestmark = pytest.mark.warm("geometric-rrt", "kinodynamic-rrt")
-
 BUDGET = MaxIterations(1200)
 QUICK = MaxIterations(80_000) | FirstSolution()
 
@@ -46,12 +44,7 @@ def generator(seed: int) -> np.random.Generator:
     return np.random.default_rng(seed)
 
 
-WARM = [
-    pytest.param(name, marks=pytest.mark.warm(name)) for name in planner_names(open_water=False)
-]
-
-
-@pytest.mark.parametrize("name", WARM)
+@pytest.mark.parametrize("name", planner_names(open_water=False))
 class TestEveryPlanner:
     def test_it_is_a_planner(self, name):
         assert isinstance(make_planner(name), Planner)

@@ -11,7 +11,7 @@ from ice_scenes import channel, straight_path
 
 from pushplan.envs.tasks.ship_ice import ShipIceTask
 from pushplan.interaction.ice_interaction import IceInteraction
-from pushplan.planners import make_planner, make_policy, warm_up
+from pushplan.planners import make_planner, make_policy
 from pushplan.planners.ship_predictive import (
     PredictiveConfig,
     PredictiveShip,
@@ -139,7 +139,6 @@ class TestEveryPredictivePlanner:
                 make_planner(name).plan(bad)
 
     def test_it_stops_when_told(self, name):
-        warm_up(name)
         world = ice(0.5)
         token = Cancellation()
         token.cancel()
