@@ -167,6 +167,12 @@ def _options(value: Any) -> int:
     return sum(map(_options, value)) if isinstance(value, list) else 0
 
 
+def lines_of_core(folder: Path) -> int:
+    """Lines of the C++ core and its bindings; none where the package has none."""
+    files = [*folder.rglob("*.hpp"), *folder.rglob("*.cpp")]
+    return sum(len(file.read_text().splitlines()) for file in files if "tests" not in file.parts)
+
+
 def measure(folder: Path) -> tuple[dict[str, str], list[str]]:
     """Figures of one package, and what stands behind them in words."""
     modules = read(folder)
@@ -182,6 +188,7 @@ def measure(folder: Path) -> tuple[dict[str, str], list[str]]:
     figures = {
         "syntax nodes": str(nodes.total()),
         "lines": str(sum(module.lines for module in modules)),
+        "lines of C++": str(lines_of_core(folder.parent / "core")),
         "files": str(len(modules)),
         "longest file": str(max(module.lines for module in modules)),
         "files over 300 lines": str(sum(module.lines > 300 for module in modules)),
