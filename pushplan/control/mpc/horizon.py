@@ -39,7 +39,7 @@ class Horizon(NamedTuple):
 
     @property
     def failures(self) -> int:
-        """How often the solver has given no solution."""
+        """Number of programs without a solution."""
         return int(self.counts[_FAILED])
 
 
