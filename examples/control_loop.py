@@ -57,7 +57,7 @@ class Robot:
 
 def loop(robot, runner, motors):
     """Drive until the goal is reached; why it ended."""
-    runner.start(robot.sense())  # loads and compiles what is needed, before the clock matters
+    runner.start(robot.sense())
     last, beat, due = None, 0, time.monotonic()
     while not robot.ended:
         seen = robot.sense() if beat % 2 == 0 else None

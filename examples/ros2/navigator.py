@@ -14,7 +14,7 @@ from given_path import GivenPath
 from scene import NavigationError, Scene
 
 from pushplan.control import ImmediateExecutor, PoseProgressChecker, Progress, PurePursuit
-from pushplan.planners import PlanFollower, make_planner, planner_names, warm_up
+from pushplan.planners import PlanFollower, make_planner, planner_names
 from pushplan.planners.following.replanning import Replanning
 from pushplan.ros import Messages, plan_from, pose_from, time_from
 from pushplan.runtime import Command, CommandStatus, RunLog, Runner
@@ -22,11 +22,9 @@ from pushplan.world import (
     Deadline,
     GoalDisc,
     InvalidInputError,
-    Movables,
     OwnBudget,
     Plan,
     PlanStatus,
-    StaticMap,
     Stop,
     Twist,
     UnknownNameError,
@@ -79,7 +77,7 @@ class Navigator:
         planner: one of `PLANNERS`, for goals that name none.
         controller: for paths that name none: ``path`` drives the path as it is; one of `PLANNERS`
             drives to the end of the path on plans of its own, which it makes again as objects
-            move. The first path of another controller takes seconds, to load it.
+            move.
         budget: of a call of `compute_path` [s].
         tolerance: how near to the goal the robot has to come [m]: one half is for the path, the
             other one for driving it.
@@ -87,6 +85,9 @@ class Navigator:
             path is given up [s].
         max_age: odometry that is older stops the robot [s].
         log: keeps what the robot sees and does.
+
+    Raises:
+        NavigationError: if there is no such planner or controller.
     """
 
     def __init__(
@@ -106,8 +107,7 @@ class Navigator:
         self.scene, self.messages = scene, messages
         self.planner, self.controller = planner, controller
         self.budget, self.tolerance, self.patience = budget, tolerance, patience
-        self._log = log
-        self._runner_options: dict[str, Any] = {"period": period, "max_age": max_age}
+        self._runner_options: dict[str, Any] = {"period": period, "max_age": max_age, "log": log}
         self._max_age = max_age
         self._runners: dict[str, Runner] = {}
         self._path = GivenPath()
@@ -115,25 +115,8 @@ class Navigator:
         self._driven = ""
         self._goal: GoalDisc | None = None
         self._outcome = ("", "")
-        self._loading: dict[str, threading.Thread] = {}
-
-    def is_loaded(self, kind: str, name: str) -> bool:
-        """Tell whether a goal can be served at once; else begin to load what it needs.
-
-        Args:
-            kind: ``planner`` or ``controller``.
-            name: as in the goal.
-
-        Raises:
-            NavigationError: if there is no such planner or controller.
-        """
-        name = self._named(kind, name)
-        key = f"{kind} {name}"
-        if key not in self._loading:
-            load = self._load_planner if kind == "planner" else self._load_controller
-            self._loading[key] = threading.Thread(target=load, args=(name,), daemon=True)
-            self._loading[key].start()
-        return not self._loading[key].is_alive()
+        for kind in _DEFAULT:
+            self._named(kind, "")  # an unknown one is refused before there is a goal
 
     def _named(self, kind: str, name: str) -> str:
         if name in _DEFAULT[kind]:
@@ -143,39 +126,6 @@ class Navigator:
             reason = str(UnknownNameError(kind, name, names))
             raise NavigationError(f"INVALID_{kind.upper()}", reason)
         return name
-
-    def _load_planner(self, name: str) -> None:
-        warm_up(name)
-
-    def _load_controller(self, name: str) -> None:
-        """Drive a moment in a small room, by a runner that nobody sees."""
-        robot = self.scene.robot
-        size = robot.circumscribed_radius
-        square = size * np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
-        pillar, far = square + np.array([6.0, 6.0]) * size, np.array([5.0, 0.0]) * size
-        bounds = size * np.array([-9.0, -9.0, 9.0, 9.0])
-        world = World(
-            robot=robot,
-            robot_pose=np.zeros(3),
-            static=StaticMap.build(polygons=[pillar], bounds=bounds),
-            movables=Movables.from_outlines([square], [[3.5 * size, 0.5 * size, 0.0]]),
-            goal=GoalDisc(far, size),
-        )
-        way = np.array([[0.0, 0.0, 0.0], [far[0], 0.0, 0.0]])
-        path = GivenPath()
-        path.given = Plan(np.array([0.0, 1.0]), way, np.ones(2), np.zeros(2), travel_cost=1.0)
-        try:
-            with self._new_runner(name, path, log=None) as runner:
-                runner.start(world)
-        except InvalidInputError:
-            return  # it does not suit the robot, which a goal is told
-
-    def warm_up(self) -> None:
-        """Load the kernels of planner and controller: seconds, minutes after an installation."""
-        for kind in _DEFAULT:
-            self.is_loaded(kind, "")
-        for thread in list(self._loading.values()):
-            thread.join()
 
     def close(self) -> None:
         """End planning."""
@@ -200,7 +150,6 @@ class Navigator:
             NavigationError: if there is none.
         """
         name = self._named("planner", planner_id)
-        warm_up(name)  # does nothing from the second time on
         disc = self._disc(self._pose(goal))
         world = self.scene.world(disc)
         if start is not None:
@@ -349,15 +298,14 @@ class Navigator:
 
     def _runner(self, name: str) -> Runner:
         if name not in self._runners:
-            self._runners[name] = self._new_runner(name, self._path, self._log)
+            if name == PATH:
+                never = Replanning(never=True)
+                follower = PlanFollower(self._path, PurePursuit(), replanning=never)
+                runner = Runner(follower, executor=ImmediateExecutor(), **self._runner_options)
+            else:
+                runner = Runner(name, **self._runner_options)
+            self._runners[name] = runner
         return self._runners[name]
-
-    def _new_runner(self, name: str, path: GivenPath, log: RunLog | None) -> Runner:
-        options = {**self._runner_options, "log": log}
-        if name != PATH:
-            return Runner(name, **options)
-        follower = PlanFollower(path, PurePursuit(), replanning=Replanning(never=True))
-        return Runner(follower, executor=ImmediateExecutor(), **options)
 
     def _pose(self, message: Any) -> FloatArray:
         try:

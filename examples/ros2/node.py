@@ -76,7 +76,6 @@ class PushplanNode(Node):  # type: ignore[misc]
             max_age=max_age,
             log=self._log,
         )
-        self.navigator.warm_up()
         self._driving = threading.Lock()
         self._newest: Any = None
         group = ReentrantCallbackGroup()
@@ -148,7 +147,6 @@ class PushplanNode(Node):  # type: ignore[misc]
     def _compute_path(self, handle: Any) -> Any:
         goal, result = handle.request, ComputePathToPose.Result()
         try:
-            self._load(handle, "planner", goal.planner_id)
             result.path, seconds = self.navigator.compute_path(
                 goal.goal,
                 goal.start if goal.use_start else None,
@@ -170,32 +168,12 @@ class PushplanNode(Node):  # type: ignore[misc]
         goal, result = handle.request, FollowPath.Result()
         with self._driving:  # the goal before this one ends first
             try:
-                self._load(handle, "controller", goal.controller_id)
                 self.navigator.follow(goal.path, goal.controller_id)
             except NavigationError as error:
                 self.navigator.cancel()  # nobody asks for what was driven before
                 self._drive(handle)
                 return self._ended(handle, result, error.code, str(error))
             return self._ended(handle, result, *self._drive(handle))
-
-    def _load(self, handle: Any, kind: str, name: str) -> None:
-        """Wait until a planner or controller can be used; the client may cancel, and is told.
-
-        Raises:
-            NavigationError: if there is none of that name, or the client has canceled.
-        """
-        drives = kind == "controller"
-        if drives and not self.navigator.is_loaded(kind, name):
-            self.navigator.cancel()
-            self._drive(handle)  # until the robot stands
-        while not self.navigator.is_loaded(kind, name):
-            if handle.is_cancel_requested:
-                raise NavigationError("CANCELED", f"the {kind} was being loaded")
-            if drives and handle is not self._newest:
-                raise NavigationError("UNKNOWN", "another path has come in")
-            if drives:
-                handle.publish_feedback(FollowPath.Feedback())
-            self.get_clock().sleep_for(Duration(seconds=0.2))
 
     def _drive(self, handle: Any) -> tuple[str, str]:
         """The control loop, until the robot stands or another path has come in."""

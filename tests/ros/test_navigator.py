@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 import sys
-import threading
 import time
 from pathlib import Path
 from types import SimpleNamespace as Some
@@ -352,16 +351,8 @@ def test_names_of_nav2s_own_files_stand_for_what_is_configured():
     assert robot.drive()[-1].outcome == "SUCCEEDED"
 
 
-def test_a_controller_is_loaded_beside_the_robots_loop():
-    robot, held = Robot(), threading.Event()
-    load = robot.navigator._load_controller
-    robot.navigator._load_controller = lambda name: held.wait(20.0) and load(name)
-    assert not robot.navigator.is_loaded("controller", "straight")
-    assert not robot.navigator.is_loaded("controller", "straight")
-    held.set()
-    robot.navigator._loading["controller straight"].join(20.0)
-    assert robot.navigator.is_loaded("controller", "straight")
-    assert code_of(lambda: robot.navigator.is_loaded("controller", "paht")) == "INVALID_CONTROLLER"
+def test_an_unknown_controller_is_refused_before_there_is_a_goal():
+    assert code_of(lambda: Robot(controller="paht")) == "INVALID_CONTROLLER"
 
 
 @pytest.mark.parametrize("back", [0.3, 50.0])
