@@ -20,7 +20,7 @@ _LINE_EVERY_S = 10.0
 
 @contextmanager
 def progress_of(out: str | None = None) -> Iterator[Progress]:
-    """How many jobs are done; after Ctrl-C what is kept.
+    """Show how many jobs are done; after Ctrl-C what is kept.
 
     Args:
         out: the run directory, if it is kept.
