@@ -177,12 +177,13 @@ void pose_searches_are_exact() {
 /// Objects in a receptacle are done, those across its edge are not; carrots lie ahead.
 void goals_and_carrots_are_where_they_are() {
   using namespace rearrangement;
-  const Shapes box({rectangle(-0.5, -0.5, 0.5, 0.5)});
+  Shapes boxes;
+  for (int k = 0; k < 4; ++k) boxes.add(rectangle(-0.5, -0.5, 0.5, 0.5));
   const auto area = rectangle(0.0, 0.0, 4.0, 4.0);
   const std::array<GoalEdge, 4> edges{
       {{{1.0, 0.0}, 4.0}, {{-1.0, 0.0}, 0.0}, {{0.0, 1.0}, 4.0}, {{0.0, -1.0}, 0.0}}};
-  GoalTest inside(box.polygons(), {area, edges, true, 0.1});
-  GoalTest outside(box.polygons(), {area, edges, false, 0.1});
+  GoalTest inside(boxes.polygons(), {area, edges, true, 0.1});
+  GoalTest outside(boxes.polygons(), {area, edges, false, 0.1});
   const std::array<Pose, 4> poses{
       {{2.0, 2.0, 0.3}, {3.8, 2.0, 0.0}, {6.0, 2.0, 0.0}, {kRemoved, kRemoved, 0.0}}};
   std::array<bool, 4> done{};
