@@ -35,7 +35,9 @@ auto view(const nb::ndarray<T, nb::shape<Extents...>, nb::c_contig, nb::device::
     return std::span<T>(array.data(), array.shape(0));
   } else {
     typename ArrayView<T, Rank>::Shape shape;
-    for (std::size_t axis = 0; axis < Rank; ++axis) shape[axis] = static_cast<Index>(array.shape(axis));
+    for (std::size_t axis = 0; axis < Rank; ++axis) {
+      shape[axis] = static_cast<Index>(array.shape(axis));
+    }
     return ArrayView<T, Rank>(array.data(), shape);
   }
 }
@@ -104,7 +106,8 @@ auto copied_rows(std::span<const T> values) {
   const auto* numbers = reinterpret_cast<const Number*>(values.data());
   auto* owned = new std::vector<Number>(numbers, numbers + kColumns * values.size());
   nb::capsule owner(owned, [](void* p) noexcept { delete static_cast<std::vector<Number>*>(p); });
-  return nb::ndarray<nb::numpy, Number, nb::ndim<2>>(owned->data(), {values.size(), kColumns}, owner);
+  return nb::ndarray<nb::numpy, Number, nb::ndim<2>>(owned->data(), {values.size(), kColumns},
+                                                     owner);
 }
 
 /// What an object of Python refers to, as an array that keeps the object: structures of `Number`,

@@ -24,13 +24,12 @@ void bind_horizon(nb::module_& module) {
           [](mpc::CommandLimits* self, bool constant, double min_speed, double max_speed,
              double max_turn_rate, double max_acceleration, double max_turn_acceleration,
              double turning_radius) {
-            new (self) mpc::CommandLimits{constant,         min_speed,
-                                          max_speed,        max_turn_rate,
-                                          max_acceleration, max_turn_acceleration,
+            new (self) mpc::CommandLimits{constant,      min_speed,        max_speed,
+                                          max_turn_rate, max_acceleration, max_turn_acceleration,
                                           turning_radius};
           },
-          "constant"_a, "min_speed"_a, "max_speed"_a, "max_turn_rate"_a,
-          "max_acceleration"_a, "max_turn_acceleration"_a, "turning_radius"_a);
+          "constant"_a, "min_speed"_a, "max_speed"_a, "max_turn_rate"_a, "max_acceleration"_a,
+          "max_turn_acceleration"_a, "turning_radius"_a);
   nb::class_<mpc::Horizon>(module, "Horizon", "Commands for the next steps, in arrays of Python.")
       .def(
           "__init__",
@@ -41,20 +40,19 @@ void bind_horizon(nb::module_& module) {
              const FloatsOut<1>& solved, const IntegersOut<1>& shifted,
              const FloatsOut<2>& solution, const FloatsOut<2>& nominal, const FloatsOut<1>& last,
              const FloatsOut<2>& sent, const IntegersOut<1>& counts) {
-            new (self) mpc::Horizon{
-                limits,
-                {units.data()[0], units.data()[1]},
-                view(columns),
-                {moves, view(blocks), view(hessian), view(gradient), view(low), view(high),
-                 view(x)},
-                view(steps),
-                view(solved),
-                view(shifted),
-                rows_as<mpc::Twist>(solution),
-                rows_as<mpc::Twist>(nominal),
-                reinterpret_cast<mpc::Twist*>(last.data()),
-                rows_as<mpc::SentCommand>(sent),
-                reinterpret_cast<mpc::HorizonCounts*>(counts.data())};
+            new (self) mpc::Horizon{limits,
+                                    {units.data()[0], units.data()[1]},
+                                    view(columns),
+                                    {moves, view(blocks), view(hessian), view(gradient), view(low),
+                                     view(high), view(x)},
+                                    view(steps),
+                                    view(solved),
+                                    view(shifted),
+                                    rows_as<mpc::Twist>(solution),
+                                    rows_as<mpc::Twist>(nominal),
+                                    reinterpret_cast<mpc::Twist*>(last.data()),
+                                    rows_as<mpc::SentCommand>(sent),
+                                    reinterpret_cast<mpc::HorizonCounts*>(counts.data())};
           },
           "limits"_a, "units"_a.noconvert(), "columns"_a.noconvert(), "moves"_a,
           "blocks"_a.noconvert(), "hessian"_a.noconvert(), "gradient"_a.noconvert(),
@@ -111,9 +109,9 @@ void bind_tracker(nb::module_& module) {
           [](mpc::Tuning* self, double size, double max_speed, double max_turn_rate,
              double max_acceleration, bool stops, bool optimise_speed, double heading_weight,
              double turn_weight, double smoothness, double terminal, double speed_weight) {
-            new (self) mpc::Tuning{size,        max_speed,      max_turn_rate,  max_acceleration,
-                                   stops,       optimise_speed, heading_weight, turn_weight,
-                                   smoothness,  terminal,       speed_weight};
+            new (self) mpc::Tuning{size,       max_speed,      max_turn_rate,  max_acceleration,
+                                   stops,      optimise_speed, heading_weight, turn_weight,
+                                   smoothness, terminal,       speed_weight};
           },
           "size"_a, "max_speed"_a, "max_turn_rate"_a, "max_acceleration"_a, "stops"_a,
           "optimise_speed"_a, "heading_weight"_a, "turn_weight"_a, "smoothness"_a, "terminal"_a,
@@ -127,8 +125,7 @@ void bind_tracker(nb::module_& module) {
              const Floats<1>& steps, const FloatsOut<2>& nominal, const FloatsOut<2>& hessian,
              const FloatsOut<1>& gradient) {
             self.assemble(track, tuning, pose(at), along, {before.data()[0], before.data()[1]},
-                          view(steps), rows_as<mpc::Twist>(nominal), view(hessian),
-                          view(gradient));
+                          view(steps), rows_as<mpc::Twist>(nominal), view(hessian), view(gradient));
           },
           "track"_a, "tuning"_a, "pose"_a.noconvert(), "along"_a, "before"_a.noconvert(),
           "steps"_a.noconvert(), "nominal"_a.noconvert(), "hessian"_a.noconvert(),

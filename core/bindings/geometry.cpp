@@ -45,8 +45,8 @@ auto pairs(std::vector<Row> values) {
   static_assert(sizeof(Row) == 2 * sizeof(Number));
   auto* owned = new std::vector<Row>(std::move(values));
   nb::capsule owner(owned, [](void* p) noexcept { delete static_cast<std::vector<Row>*>(p); });
-  return nb::ndarray<nb::numpy, Number, nb::shape<-1, 2>>(
-      reinterpret_cast<Number*>(owned->data()), {owned->size(), 2}, owner);
+  return nb::ndarray<nb::numpy, Number, nb::shape<-1, 2>>(reinterpret_cast<Number*>(owned->data()),
+                                                          {owned->size(), 2}, owner);
 }
 
 template <class T>
@@ -101,8 +101,8 @@ void bind_shapes(nb::module_& module) {
         transform(poses(bodies), Polygons{points(vertices), view(offsets)},
                   reinterpret_cast<Vec2*>(out.data()));
       },
-      "poses"_a.noconvert(), "vertices"_a.noconvert(), "offsets"_a.noconvert(),
-      "out"_a.noconvert(), ReleaseGil());
+      "poses"_a.noconvert(), "vertices"_a.noconvert(), "offsets"_a.noconvert(), "out"_a.noconvert(),
+      ReleaseGil());
   module.def(
       "arc_step",
       [](const OnePose& from, double distance, double turn) {
@@ -168,11 +168,9 @@ void bind_obstacles(nb::module_& module) {
       .def(
           "fill_clearance",
           [](const Obstacles& self, const FloatsOut<2>& out, Index first, Index last,
-             const OnePoint& origin, double step) {
-            fill_clearance(view(out), first, last, {point(origin), step}, self);
-          },
-          "out"_a.noconvert(), "first"_a, "last"_a, "origin"_a.noconvert(), "step"_a,
-          ReleaseGil());
+             const OnePoint& origin,
+             double step) { fill_clearance(view(out), first, last, {point(origin), step}, self); },
+          "out"_a.noconvert(), "first"_a, "last"_a, "origin"_a.noconvert(), "step"_a, ReleaseGil());
   module.def(
       "core_distance",
       [](double x, double y, const Points& core) { return core_distance({x, y}, points(core)); },
@@ -185,8 +183,8 @@ void bind_visibility(nb::module_& module) {
           "__init__",
           [](Regions* self, const Floats<2>& discs, const Floats<2>& half_planes,
              const Points& vertices, const Integers<1>& offsets) {
-            new (self) Regions{rows<Disc>(discs), rows<HalfPlane>(half_planes),
-                               {points(vertices), view(offsets)}};
+            new (self) Regions{
+                rows<Disc>(discs), rows<HalfPlane>(half_planes), {points(vertices), view(offsets)}};
           },
           "discs"_a.noconvert(), "half_planes"_a.noconvert(), "vertices"_a.noconvert(),
           "offsets"_a.noconvert(), nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(),
@@ -230,9 +228,8 @@ void bind_visibility(nb::module_& module) {
       .def(
           "__init__",
           [](GoalScene* self, const Regions& regions, const Obstacles& obstacles,
-             const BoxArray& bounds, double gap) {
-            new (self) GoalScene{regions, obstacles, box(bounds), gap};
-          },
+             const BoxArray& bounds,
+             double gap) { new (self) GoalScene{regions, obstacles, box(bounds), gap}; },
           "regions"_a, "obstacles"_a, "box"_a.noconvert(), "gap"_a, nb::keep_alive<1, 2>(),
           nb::keep_alive<1, 3>())
       .def(
@@ -256,8 +253,8 @@ void bind_visibility(nb::module_& module) {
           "points"_a.noconvert(), "(N, 3) `goal_leg` of each point.")
       .def(
           "node_leg",
-          [](const GoalScene& self, double x, double y, double limit, Index hint,
-             bool tangent_only, const Nodes& nodes) {
+          [](const GoalScene& self, double x, double y, double limit, Index hint, bool tangent_only,
+             const Nodes& nodes) {
             const NodeLeg leg =
                 node_leg({x, y}, limit, hint, tangent_only, nodes, self.obstacles, self.gap);
             return std::tuple(leg.distance, leg.node);
@@ -309,8 +306,8 @@ void bind_visibility(nb::module_& module) {
          const FloatsOut<1>& out) {
         sample(view(values), {{ox, oy}, step}, points(at), view(out));
       },
-      "values"_a.noconvert(), "ox"_a, "oy"_a, "step"_a, "points"_a.noconvert(),
-      "out"_a.noconvert(), ReleaseGil());
+      "values"_a.noconvert(), "ox"_a, "oy"_a, "step"_a, "points"_a.noconvert(), "out"_a.noconvert(),
+      ReleaseGil());
 }
 
 void bind_path_search(nb::module_& module) {
@@ -318,7 +315,8 @@ void bind_path_search(nb::module_& module) {
       .def(nb::init<const Obstacles&, double>(), "obstacles"_a, "margin"_a, nb::keep_alive<1, 2>())
       .def_prop_ro("shape", [](const ObstacleGrid& s) { return std::tuple(s.rows(), s.columns()); })
       .def_prop_ro("cell", &ObstacleGrid::cell)
-      .def_prop_ro("first", [](const ObstacleGrid& s) { return copied(s.first()); }, kOwned)
+      .def_prop_ro(
+          "first", [](const ObstacleGrid& s) { return copied(s.first()); }, kOwned)
       .def_prop_ro("items", [](const ObstacleGrid& s) { return copied(s.items()); }, kOwned);
   nb::class_<GridSight>(module, "GridSight", "Tests of sight with memory for one thread.")
       .def(nb::init<const ObstacleGrid&>(), "grid"_a, nb::keep_alive<1, 2>())
@@ -358,7 +356,8 @@ void bind_path_search(nb::module_& module) {
       .def("run", &VisibilitySearch::run, "budget"_a, ReleaseGil())
       .def_prop_ro("end", &VisibilitySearch::end)
       .def_prop_ro("lines_tested", &VisibilitySearch::lines_tested)
-      .def_prop_ro("parents", [](const VisibilitySearch& s) { return copied(s.parents()); }, kOwned);
+      .def_prop_ro(
+          "parents", [](const VisibilitySearch& s) { return copied(s.parents()); }, kOwned);
 }
 
 void bind_shadows(nb::module_& module) {

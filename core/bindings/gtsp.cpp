@@ -21,7 +21,8 @@ gtsp::WalkClusters walk_clusters(const Floats<1>& prices, const Integers<1>& siz
 
 std::span<const Index> as_span(const std::vector<Index>& values) { return values; }
 
-using PathsTuple = std::tuple<IntegersOut<1>, IntegersOut<1>, FloatsOut<1>, FloatsOut<1>, IntegersOut<1>>;
+using PathsTuple =
+    std::tuple<IntegersOut<1>, IntegersOut<1>, FloatsOut<1>, FloatsOut<1>, IntegersOut<1>>;
 
 template <class Paths>
 Paths paths_of(const PathsTuple& arrays) {
@@ -40,8 +41,8 @@ void bind_gtsp(nb::module_& module) {
           [](gtsp::Problem* self, const Floats<2>& costs, const Floats<2>& reverse,
              const Floats<2>& into, const Floats<2>& onto, const Integers<1>& offsets,
              const Integers<2>& near, const Floats<2>& between, bool symmetric) {
-            new (self) gtsp::Problem{view(costs), view(reverse), view(into),    view(onto),
-                                     view(offsets), view(near),  view(between), symmetric};
+            new (self) gtsp::Problem{view(costs),   view(reverse), view(into),    view(onto),
+                                     view(offsets), view(near),    view(between), symmetric};
           },
           "costs"_a.noconvert(), "reverse"_a.noconvert(), "into"_a.noconvert(),
           "onto"_a.noconvert(), "offsets"_a.noconvert(), "near"_a.noconvert(),
@@ -62,10 +63,12 @@ void bind_gtsp(nb::module_& module) {
           "problem"_a, "order"_a.noconvert(), "seed"_a, "max_removed"_a, "blink"_a, "reach"_a,
           nb::keep_alive<1, 2>())
       .def(
-          "start", [](gtsp::RuinRecreate& self, const Integers<1>& order) { self.start(view(order)); },
+          "start",
+          [](gtsp::RuinRecreate& self, const Integers<1>& order) { self.start(view(order)); },
           "order"_a.noconvert(), ReleaseGil())
       .def("start_from_best", &gtsp::RuinRecreate::start_from_best)
-      .def("run", &gtsp::RuinRecreate::run, "temperature"_a, "tolerance"_a, "rounds"_a, ReleaseGil())
+      .def("run", &gtsp::RuinRecreate::run, "temperature"_a, "tolerance"_a, "rounds"_a,
+           ReleaseGil())
       .def(
           "narrow",
           [](gtsp::RuinRecreate& self, const gtsp::Problem& problem, const Integers<1>& kept) {
@@ -75,12 +78,24 @@ void bind_gtsp(nb::module_& module) {
       .def_prop_ro("cost", [](const gtsp::RuinRecreate& self) { return self.current().cost; })
       .def_prop_ro("best_cost", [](const gtsp::RuinRecreate& self) { return self.best().cost; })
       .def_prop_ro("random_state", &gtsp::RuinRecreate::random_state)
-      .def_prop_ro("order", [](const gtsp::RuinRecreate& s) { return copied(as_span(s.current().order)); }, kOwned)
-      .def_prop_ro("nodes", [](const gtsp::RuinRecreate& s) { return copied(as_span(s.current().nodes)); }, kOwned)
-      .def_prop_ro("best_order", [](const gtsp::RuinRecreate& s) { return copied(as_span(s.best().order)); }, kOwned)
-      .def_prop_ro("best_nodes", [](const gtsp::RuinRecreate& s) { return copied(as_span(s.best().nodes)); }, kOwned)
-      .def_prop_ro("least_slack", [](const gtsp::RuinRecreate& s) { return copied(s.least_slack()); }, kOwned)
-      .def_prop_ro("total_slack", [](const gtsp::RuinRecreate& s) { return copied(s.total_slack()); }, kOwned);
+      .def_prop_ro(
+          "order", [](const gtsp::RuinRecreate& s) { return copied(as_span(s.current().order)); },
+          kOwned)
+      .def_prop_ro(
+          "nodes", [](const gtsp::RuinRecreate& s) { return copied(as_span(s.current().nodes)); },
+          kOwned)
+      .def_prop_ro(
+          "best_order", [](const gtsp::RuinRecreate& s) { return copied(as_span(s.best().order)); },
+          kOwned)
+      .def_prop_ro(
+          "best_nodes", [](const gtsp::RuinRecreate& s) { return copied(as_span(s.best().nodes)); },
+          kOwned)
+      .def_prop_ro(
+          "least_slack", [](const gtsp::RuinRecreate& s) { return copied(s.least_slack()); },
+          kOwned)
+      .def_prop_ro(
+          "total_slack", [](const gtsp::RuinRecreate& s) { return copied(s.total_slack()); },
+          kOwned);
 
   module.def(
       "mark_needed",
@@ -108,9 +123,8 @@ void bind_gtsp(nb::module_& module) {
         gtsp::extend_walks(view(walks), view(longer), view(blocks),
                            walk_clusters(prices, sizes, moves), low, high);
       },
-      "walks"_a.noconvert(), "longer"_a.noconvert(), "blocks"_a.noconvert(),
-      "moves"_a.noconvert(), "prices"_a.noconvert(), "sizes"_a.noconvert(), "low"_a, "high"_a,
-      ReleaseGil());
+      "walks"_a.noconvert(), "longer"_a.noconvert(), "blocks"_a.noconvert(), "moves"_a.noconvert(),
+      "prices"_a.noconvert(), "sizes"_a.noconvert(), "low"_a, "high"_a, ReleaseGil());
 
   module.def(
       "read_visits",
@@ -127,7 +141,8 @@ void bind_gtsp(nb::module_& module) {
       "extend_paths",
       [](const Floats<3>& within, const Floats<4>& costs, const Integers<2>& lists,
          const Floats<1>& prices, const Integers<1>& sizes, double limit, const PathsTuple& paths,
-         Index low, Index high, const IntegersOut<1>& slots, const PathsTuple& longer, Index found) {
+         Index low, Index high, const IntegersOut<1>& slots, const PathsTuple& longer,
+         Index found) {
         const gtsp::PathBounds bounds{view(within), view(costs), view(lists),
                                       view(prices), view(sizes), limit};
         return gtsp::extend_paths(bounds, paths_of<gtsp::ConstPaths>(paths), low, high, view(slots),

@@ -91,20 +91,19 @@ void bind_interaction(nb::module_& module) {
           "robot_vertices"_a.noconvert(), "robot_offsets"_a.noconvert(), "wall_parts"_a,
           "robot_radius"_a, "vertices"_a.noconvert(), "offsets"_a.noconvert(),
           "radii"_a.noconvert(), "inverse_masses"_a.noconvert(), "inverse_gyration"_a.noconvert(),
-          "wall_vertices"_a.noconvert(), "wall_offsets"_a.noconvert(),
-          "wall_boxes"_a.noconvert(), nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(),
-          nb::keep_alive<1, 6>(), nb::keep_alive<1, 7>(), nb::keep_alive<1, 8>(),
-          nb::keep_alive<1, 9>(), nb::keep_alive<1, 10>(), nb::keep_alive<1, 11>(),
-          nb::keep_alive<1, 12>(), nb::keep_alive<1, 13>());
+          "wall_vertices"_a.noconvert(), "wall_offsets"_a.noconvert(), "wall_boxes"_a.noconvert(),
+          nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(), nb::keep_alive<1, 6>(),
+          nb::keep_alive<1, 7>(), nb::keep_alive<1, 8>(), nb::keep_alive<1, 9>(),
+          nb::keep_alive<1, 10>(), nb::keep_alive<1, 11>(), nb::keep_alive<1, 12>(),
+          nb::keep_alive<1, 13>());
 
-  nb::class_<QuasiStatic>(module, "QuasiStatic",
-                          "Quasi-static pushing with memory for one thread.")
+  nb::class_<QuasiStatic>(module, "QuasiStatic", "Quasi-static pushing with memory for one thread.")
       .def(
           "__init__",
           [](QuasiStatic* self, const Bodies& bodies, double max_step, double tolerance,
              double jam_depth, Index iterations, double friction, double static_friction) {
-            new (self) QuasiStatic(bodies, {max_step, tolerance, jam_depth, iterations, friction,
-                                            static_friction});
+            new (self) QuasiStatic(
+                bodies, {max_step, tolerance, jam_depth, iterations, friction, static_friction});
           },
           "bodies"_a, "max_step"_a, "tolerance"_a, "jam_depth"_a, "iterations"_a, "friction"_a,
           "static_friction"_a, nb::keep_alive<1, 2>())
@@ -117,11 +116,13 @@ void bind_interaction(nb::module_& module) {
           "robot_from"_a.noconvert(), "robot_to"_a.noconvert(), "poses"_a.noconvert(),
           "lengths"_a.noconvert(), ReleaseGil())
       .def(
-          "robot_held", [](QuasiStatic& self, const OnePose& at) { return self.robot_held(pose(at)); },
+          "robot_held",
+          [](QuasiStatic& self, const OnePose& at) { return self.robot_held(pose(at)); },
           "pose"_a.noconvert(), ReleaseGil())
       .def(
           "sweep",
-          [](QuasiStatic& self, const Poses& path, const PosesOut& objects, const FloatsOut<3>& out) {
+          [](QuasiStatic& self, const Poses& path, const PosesOut& objects,
+             const FloatsOut<3>& out) {
             return self.sweep(poses(path), poses(objects), pose_rows(out));
           },
           "path"_a.noconvert(), "poses"_a.noconvert(), "out"_a.noconvert(), ReleaseGil())
@@ -146,7 +147,8 @@ void bind_interaction(nb::module_& module) {
           nb::keep_alive<1, 3>(), nb::keep_alive<1, 5>(), nb::keep_alive<1, 6>(),
           nb::keep_alive<1, 7>(), nb::keep_alive<1, 8>(), nb::keep_alive<1, 9>());
 
-  nb::class_<IceContacts>(module, "IceContacts", "Floes that push floes, with memory for one thread.")
+  nb::class_<IceContacts>(module, "IceContacts",
+                          "Floes that push floes, with memory for one thread.")
       .def(
           "__init__",
           [](IceContacts* self, const IceBodies& bodies, double step, Index iterations,
@@ -169,7 +171,8 @@ void bind_interaction(nb::module_& module) {
               "__init__",
               [](IceInteraction* self, const IceBodies& bodies, double step, Index iterations,
                  double hull_friction, double friction, double still) {
-                new (self) IceInteraction(bodies, {step, iterations, hull_friction, friction, still});
+                new (self)
+                    IceInteraction(bodies, {step, iterations, hull_friction, friction, still});
               },
               "bodies"_a, "step"_a, "iterations"_a, "hull_friction"_a, "friction"_a, "still"_a,
               nb::keep_alive<1, 2>()));
@@ -180,9 +183,9 @@ void bind_interaction(nb::module_& module) {
               "__init__",
               [](CalledInteraction* self, std::uintptr_t function, std::uintptr_t context,
                  const Floats<1>& radii, const Floats<1>& inverse_masses, const nb::object&) {
-                new (self) CalledInteraction(
-                    reinterpret_cast<CalledInteraction::Advance>(function),
-                    reinterpret_cast<void*>(context), view(radii), view(inverse_masses));
+                new (self) CalledInteraction(reinterpret_cast<CalledInteraction::Advance>(function),
+                                             reinterpret_cast<void*>(context), view(radii),
+                                             view(inverse_masses));
               },
               "function"_a, "context"_a, "radii"_a.noconvert(), "inverse_masses"_a.noconvert(),
               "owner"_a = nb::none(), nb::keep_alive<1, 4>(), nb::keep_alive<1, 5>(),

@@ -78,8 +78,8 @@ void bind_paths(nb::module_& module) {
       "out_curvatures"_a.noconvert());
   module.def(
       "lay_dubins",
-      [](const OnePose& start, const OnePose& end, double radius, double spacing,
-         double most_turn, const PosesOut& out, const FloatsOut<1>& curvatures) {
+      [](const OnePose& start, const OnePose& end, double radius, double spacing, double most_turn,
+         const PosesOut& out, const FloatsOut<1>& curvatures) {
         return lay_dubins(pose(start), pose(end), {radius, spacing, most_turn},
                           buffer(out, curvatures));
       },
@@ -108,8 +108,8 @@ void bind_maps(nb::module_& module) {
                   view(grid));
       },
       "outlines"_a.noconvert(), "offsets"_a.noconvert(), "centres"_a.noconvert(),
-      "radii"_a.noconvert(), "totals"_a.noconvert(), "exponent"_a, "soft"_a,
-      "grid"_a.noconvert(), ReleaseGil());
+      "radii"_a.noconvert(), "totals"_a.noconvert(), "exponent"_a, "soft"_a, "grid"_a.noconvert(),
+      ReleaseGil());
   module.def(
       "block",
       [](const Points& outlines, const Integers<1>& offsets, double margin,
@@ -124,10 +124,9 @@ void bind_maps(nb::module_& module) {
       "grid"_a.noconvert(), "sums"_a.noconvert(), ReleaseGil());
   module.def(
       "place_costs",
-      [](const Floats<2>& sums, const Integers<1>& rows, Index goal_row,
-         const Integers<1>& columns, std::pair<Index, Index> between, Index half, Index reach,
-         Index along, Index stage, double factor, double cell, double lean,
-         const FloatsOut<2>& costs) {
+      [](const Floats<2>& sums, const Integers<1>& rows, Index goal_row, const Integers<1>& columns,
+         std::pair<Index, Index> between, Index half, Index reach, Index along, Index stage,
+         double factor, double cell, double lean, const FloatsOut<2>& costs) {
         place_costs(view(sums),
                     {view(rows), view(columns), goal_row, between.first, between.second},
                     {half, reach, along, stage, factor, cell, lean}, view(costs));
@@ -171,8 +170,7 @@ void bind_primitives(nb::module_& module) {
 }
 
 void bind_lattice(nb::module_& module) {
-  nb::class_<PoseLattice>(module, "PoseLattice",
-                          "Places and headings joined by motion primitives.")
+  nb::class_<PoseLattice>(module, "PoseLattice", "Places and headings joined by motion primitives.")
       .def(
           "__init__",
           [](PoseLattice* self, Index rows, Index columns, double step, Index cells,
@@ -202,16 +200,15 @@ void bind_lattice(nb::module_& module) {
                                    view(place_costs),
                                    inflation};
           },
-          "rows"_a, "columns"_a, "step"_a, "cells"_a, "corner"_a.noconvert(),
-          "first"_a.noconvert(), "ends"_a.noconvert(), "lengths"_a.noconvert(),
-          "boxes"_a.noconvert(), "run_first"_a.noconvert(), "runs"_a.noconvert(),
-          "cost_sums"_a.noconvert(), "blocked_sums"_a.noconvert(), "stride"_a,
-          "planes"_a.noconvert(), "goal"_a.noconvert(), "row_bounds"_a.noconvert(),
-          "place_costs"_a.noconvert(), "inflation"_a, nb::keep_alive<1, 7>(),
-          nb::keep_alive<1, 8>(), nb::keep_alive<1, 9>(), nb::keep_alive<1, 10>(),
-          nb::keep_alive<1, 11>(), nb::keep_alive<1, 12>(), nb::keep_alive<1, 13>(),
-          nb::keep_alive<1, 14>(), nb::keep_alive<1, 16>(), nb::keep_alive<1, 18>(),
-          nb::keep_alive<1, 19>())
+          "rows"_a, "columns"_a, "step"_a, "cells"_a, "corner"_a.noconvert(), "first"_a.noconvert(),
+          "ends"_a.noconvert(), "lengths"_a.noconvert(), "boxes"_a.noconvert(),
+          "run_first"_a.noconvert(), "runs"_a.noconvert(), "cost_sums"_a.noconvert(),
+          "blocked_sums"_a.noconvert(), "stride"_a, "planes"_a.noconvert(), "goal"_a.noconvert(),
+          "row_bounds"_a.noconvert(), "place_costs"_a.noconvert(), "inflation"_a,
+          nb::keep_alive<1, 7>(), nb::keep_alive<1, 8>(), nb::keep_alive<1, 9>(),
+          nb::keep_alive<1, 10>(), nb::keep_alive<1, 11>(), nb::keep_alive<1, 12>(),
+          nb::keep_alive<1, 13>(), nb::keep_alive<1, 14>(), nb::keep_alive<1, 16>(),
+          nb::keep_alive<1, 18>(), nb::keep_alive<1, 19>())
       .def(
           "successors",
           [](const PoseLattice& self, Index node, const IntegersOut<1>& nodes,
@@ -246,24 +243,24 @@ void bind_lattice(nb::module_& module) {
       "swath_sum",
       [](const Floats<1>& sums, const Integers<2>& runs, Index begin, Index end, Index at) {
         const auto all = rows_as<const SwathRun>(runs);
-        return swath_sum(view(sums),
-                         all.subspan(static_cast<std::size_t>(begin),
-                                     static_cast<std::size_t>(end - begin)),
-                         at);
+        return swath_sum(
+            view(sums),
+            all.subspan(static_cast<std::size_t>(begin), static_cast<std::size_t>(end - begin)),
+            at);
       },
       "sums"_a.noconvert(), "runs"_a.noconvert(), "begin"_a, "end"_a, "at"_a);
 
   nb::class_<LatticeSearch>(module, "LatticeSearch", "A* over a `PoseLattice`.")
       .def(nb::init<PoseLattice, Index>(), "lattice"_a, "size"_a, nb::keep_alive<1, 2>())
       .def("restart", &LatticeSearch::restart, "lattice"_a, nb::keep_alive<1, 2>())
-      .def("start", &LatticeSearch::start, "node"_a, "cost"_a = 0.0, "bound"_a = 0.0,
-           "edge"_a = -1)
+      .def("start", &LatticeSearch::start, "node"_a, "cost"_a = 0.0, "bound"_a = 0.0, "edge"_a = -1)
       .def("run", &LatticeSearch::run, "budget"_a, ReleaseGil())
       .def_prop_ro("goal", &LatticeSearch::goal)
       .def_prop_ro("cost", &LatticeSearch::cost)
       .def_prop_ro("generated", &LatticeSearch::generated)
-      .def_prop_ro("tree", [](LatticeSearch& self) -> SearchTree& { return self.tree(); },
-                   nb::rv_policy::reference_internal);
+      .def_prop_ro(
+          "tree", [](LatticeSearch& self) -> SearchTree& { return self.tree(); },
+          nb::rv_policy::reference_internal);
 }
 
 }  // namespace

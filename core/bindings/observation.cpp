@@ -41,9 +41,8 @@ void bind_observation(nb::module_& module) {
         fill_bodies(view(image), image_view(numbers), poses(bodies),
                     {points(vertices), view(offsets)}, view(radii), value);
       },
-      "image"_a.noconvert(), "view"_a.noconvert(), "poses"_a.noconvert(),
-      "vertices"_a.noconvert(), "offsets"_a.noconvert(), "radii"_a.noconvert(), "value"_a,
-      ReleaseGil());
+      "image"_a.noconvert(), "view"_a.noconvert(), "poses"_a.noconvert(), "vertices"_a.noconvert(),
+      "offsets"_a.noconvert(), "radii"_a.noconvert(), "value"_a, ReleaseGil());
   module.def(
       "sample",
       [](const ImageOut& image, const Floats<1>& numbers,

@@ -50,9 +50,7 @@ void bind_cost_to_go(nb::module_& module) {
       .def(
           "__init__",
           [](CostToGo* self, const Floats<3>& values, const Floats<2>& floor, double x, double y,
-             double cell) {
-            new (self) CostToGo{view(values), view(floor), {{x, y}, cell}};
-          },
+             double cell) { new (self) CostToGo{view(values), view(floor), {{x, y}, cell}}; },
           "values"_a.noconvert(), "floor"_a.noconvert(), "x"_a, "y"_a, "cell"_a,
           nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>())
       .def_prop_ro("shape",
@@ -75,9 +73,8 @@ void bind_cost_to_go(nb::module_& module) {
                 {static_cast<Index>(ends.shape(0)), static_cast<Index>(ends.shape(1))});
             return sweep_cost_to_go(view(values), self, view(free), view(order), {poses, length});
           },
-          "values"_a.noconvert(), "free"_a.noconvert(), "order"_a.noconvert(),
-          "ends"_a.noconvert(), "length"_a, ReleaseGil(),
-          "`values` are those of the table, to write to.");
+          "values"_a.noconvert(), "free"_a.noconvert(), "order"_a.noconvert(), "ends"_a.noconvert(),
+          "length"_a, ReleaseGil(), "`values` are those of the table, to write to.");
   module.def(
       "mark_free",
       [](const Array<bool, 3>& free, Index first, Index last, double x, double y, double cell,
@@ -128,8 +125,8 @@ void bind_push_searches(nb::module_& module) {
                                   {s[0], s[1], s[2]}, problem, model);
         return found.status == Growth::Status::kFull ? Index{-2} : found.node;
       },
-      "tree"_a, "draws"_a.noconvert(), "bound"_a, "longest"_a, "scales"_a.noconvert(),
-      "problem"_a, "model"_a, ReleaseGil(), "A node in the goal; -1: none; -2: memory is full.");
+      "tree"_a, "draws"_a.noconvert(), "bound"_a, "longest"_a, "scales"_a.noconvert(), "problem"_a,
+      "model"_a, ReleaseGil(), "A node in the goal; -1: none; -2: memory is full.");
   module.def(
       "roll_objects",
       [](M& model, const Poses& start, const Rollouts& rollouts) {
@@ -174,8 +171,9 @@ void bind_push_aware(nb::module_& module) {
           "node"_a, kOwned);
   nb::class_<PushSearch>(module, "PushSearch", "A best-first search over arcs that push.")
       .def("run", &PushSearch::run, "budget"_a, ReleaseGil())
-      .def_prop_ro("goal", [](const PushSearch& self) { return self.goal() >> 1; },
-                   "The node of the tree in the goal, -1 before it is reached.");
+      .def_prop_ro(
+          "goal", [](const PushSearch& self) { return self.goal() >> 1; },
+          "The node of the tree in the goal, -1 before it is reached.");
 }
 
 void bind_rollouts(nb::module_& module) {
@@ -185,14 +183,10 @@ void bind_rollouts(nb::module_& module) {
           [](RolloutProblem* self, double period, Index substeps, const Floats<1>& limits,
              const Footprint& footprint, const ConvexObstacles& walls, const Floats<1>& goal,
              bool has_goal, double allowed) {
-            new (self) RolloutProblem{period,
-                                      substeps,
-                                      *reinterpret_cast<const DriveLimits*>(limits.data()),
-                                      footprint,
-                                      walls,
-                                      goal_region(goal),
-                                      has_goal,
-                                      allowed};
+            new (self) RolloutProblem{
+                period,    substeps, *reinterpret_cast<const DriveLimits*>(limits.data()),
+                footprint, walls,    goal_region(goal),
+                has_goal,  allowed};
           },
           "period"_a, "substeps"_a, "limits"_a.noconvert(), "footprint"_a, "walls"_a,
           "goal"_a.noconvert(), "has_goal"_a, "allowed"_a, nb::keep_alive<1, 5>(),

@@ -1,5 +1,4 @@
 #include <nanobind/stl/pair.h>
-
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
@@ -33,8 +32,8 @@ auto copied_state(const PushState& state) {
 
 void write(const BoxMotion& motion, double* out) {
   const double mode = static_cast<double>(motion.mode);
-  const double numbers[]{motion.normal,   motion.sideways, motion.turn,
-                         motion.pressure, mode,            motion.shear};
+  const double numbers[]{motion.normal, motion.sideways, motion.turn, motion.pressure,
+                         mode,          motion.shear};
   std::ranges::copy(numbers, out);
 }
 
@@ -143,8 +142,8 @@ void bind_clearance(nb::module_& module) {
             return self.free_fraction(contact, normal, state_of(start), {v, w}, duration,
                                       obstacles);
           },
-          "contact"_a, "normal"_a, "start"_a.noconvert(), "v"_a, "w"_a, "duration"_a,
-          "obstacles"_a, ReleaseGil());
+          "contact"_a, "normal"_a, "start"_a.noconvert(), "v"_a, "w"_a, "duration"_a, "obstacles"_a,
+          ReleaseGil());
 }
 
 void bind_problem(nb::module_& module) {
@@ -154,9 +153,9 @@ void bind_problem(nb::module_& module) {
           [](PushWeights* self, double length, double max_speed, double half, double curvature,
              double heading, double offset, double rim, double safe, double angle, double grip,
              double turn, double speed, double smoothness, double terminal) {
-            new (self) PushWeights{length, max_speed, half,  curvature,  heading,
-                                   offset, rim,       safe,  angle,      grip,
-                                   turn,   speed,     smoothness, terminal};
+            new (self)
+                PushWeights{length, max_speed, half, curvature, heading, offset,     rim,
+                            safe,   angle,     grip, turn,      speed,   smoothness, terminal};
           },
           "length"_a, "max_speed"_a, "half"_a, "curvature"_a, "heading"_a, "offset"_a, "rim"_a,
           "safe"_a, "angle"_a, "grip"_a, "turn"_a, "speed"_a, "smoothness"_a, "terminal"_a);
@@ -164,9 +163,8 @@ void bind_problem(nb::module_& module) {
       .def(
           "__init__",
           [](PushingProblem* self, const BoxContact& contact, const mpc::ReferencePath& track,
-             const PushWeights& weights, const OneState& start, double along,
-             const Floats<1>& last, const Floats<1>& units, const Floats<1>& steps,
-             const Integers<1>& groups) {
+             const PushWeights& weights, const OneState& start, double along, const Floats<1>& last,
+             const Floats<1>& units, const Floats<1>& steps, const Integers<1>& groups) {
             new (self) PushingProblem{contact,
                                       track,
                                       weights,
@@ -210,9 +208,8 @@ void bind_tracker(nb::module_& module) {
             self->faces = {rows_as<const FaceScore>(scores), self->contacts, view(normals),
                            view(curvatures)};
           },
-          "scores"_a.noconvert(), "contacts"_a, "normals"_a.noconvert(),
-          "curvatures"_a.noconvert(), nb::keep_alive<1, 2>(), nb::keep_alive<1, 4>(),
-          nb::keep_alive<1, 5>());
+          "scores"_a.noconvert(), "contacts"_a, "normals"_a.noconvert(), "curvatures"_a.noconvert(),
+          nb::keep_alive<1, 2>(), nb::keep_alive<1, 4>(), nb::keep_alive<1, 5>());
   nb::class_<PushTracker>(module, "PushTracker", "Pushes one box along one path.")
       .def(
           "__init__",
@@ -229,15 +226,13 @@ void bind_tracker(nb::module_& module) {
       .def(
           "observe",
           [](PushTracker& self, const mpc::ReferencePath& track, const OnePose& robot,
-             const OnePose& box, double time, double held) {
-            return self.observe(track, pose(robot), pose(box), time, held);
-          },
+             const OnePose& box, double time,
+             double held) { return self.observe(track, pose(robot), pose(box), time, held); },
           "track"_a, "robot"_a.noconvert(), "box"_a.noconvert(), "time"_a, "held"_a, ReleaseGil())
       .def("assemble", &PushTracker::assemble, "track"_a, "held"_a, ReleaseGil())
       .def(
           "drive",
-          [](PushTracker& self, const Obstacles& obstacles, bool solved, double time,
-             double held) {
+          [](PushTracker& self, const Obstacles& obstacles, bool solved, double time, double held) {
             const Twist twist = self.drive(obstacles, solved, time, held);
             return std::pair{twist.v, twist.w};
           },

@@ -42,9 +42,7 @@ class NewArray {
   }
 
   ArrayView<T, Rank> view() const { return view_; }
-  std::span<T> numbers() const {
-    return {numbers_.get(), static_cast<std::size_t>(view_.size())};
-  }
+  std::span<T> numbers() const { return {numbers_.get(), static_cast<std::size_t>(view_.size())}; }
   /// The same as structures of such numbers.
   template <class Struct>
   Struct* as() const {
@@ -80,8 +78,8 @@ void bind_goal(nb::module_& module) {
           "__init__",
           [](ObjectGoal* self, const Points& polygon, const Floats<2>& edges, bool is_receptacle,
              double slack) {
-            new (self) ObjectGoal{points(polygon), rows_as<const GoalEdge>(edges), is_receptacle,
-                                  slack};
+            new (self)
+                ObjectGoal{points(polygon), rows_as<const GoalEdge>(edges), is_receptacle, slack};
           },
           "polygon"_a.noconvert(), "edges"_a.noconvert(), "is_receptacle"_a, "slack"_a,
           nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>());
@@ -89,9 +87,8 @@ void bind_goal(nb::module_& module) {
       "all_done",
       [](const Poses& objects, const Bodies& bodies, const ObjectGoal& goal) {
         NewArray<bool, 1> done({extent(objects, 0)});
-        without_gil([&] {
-          GoalTest(bodies.objects, goal).all_done(poses(objects), done.numbers());
-        });
+        without_gil(
+            [&] { GoalTest(bodies.objects, goal).all_done(poses(objects), done.numbers()); });
         return done.give();
       },
       "poses"_a.noconvert(), "bodies"_a, "goal"_a, kOwned,
@@ -122,7 +119,8 @@ struct OwnedGrid {
   PoseGrid grid;
 };
 
-OwnedGrid make_grid(Vec2 origin, double step, Index rows, Index columns, CollisionChecker& checker) {
+OwnedGrid make_grid(Vec2 origin, double step, Index rows, Index columns,
+                    CollisionChecker& checker) {
   constexpr Index kHeadings = kHeadingCount;
   const ArrayView<bool, 3>::Shape shape{kHeadings, rows, columns};
   const ArrayView<bool, 4>::Shape moves{2, kHeadings, rows, columns};
@@ -169,8 +167,8 @@ void bind_grid(nb::module_& module) {
           [](nb::handle_t<OwnedGrid> self) {
             return shown(nb::cast<const OwnedGrid&>(self).grid.blocked_moves, self);
           },
-          "(2, 16, rows, columns) from where it is in the way of the move ahead, and of the turn to "
-          "the next heading.")
+          "(2, 16, rows, columns) from where it is in the way of the move ahead, and of the turn "
+          "to the next heading.")
       .def(
           "near_poses",
           [](const OwnedGrid& self, const OnePose& at, double reach) {
@@ -187,8 +185,7 @@ void bind_grid(nb::module_& module) {
             NewArray<float, 4> out({extent(objects, 0), static_cast<Index>(kHeadingCount),
                                     grid.rows(), grid.columns()});
             without_gil([&] {
-              contact_depths(grid, shape, poses(objects), bodies.objects, bodies.radii,
-                             out.view());
+              contact_depths(grid, shape, poses(objects), bodies.objects, bodies.radii, out.view());
             });
             return out.give();
           },
@@ -219,8 +216,7 @@ void bind_grid(nb::module_& module) {
                                                extent(layers, 3)};
         NewArray<double, 3> depth(shape);
         NewArray<double, 3> touch(shape);
-        without_gil(
-            [&] { add_layers(view(layers), view(weights), depth.view(), touch.view()); });
+        without_gil([&] { add_layers(view(layers), view(weights), depth.view(), touch.view()); });
         return std::pair(depth.give(), touch.give());
       },
       "layers"_a.noconvert(), "weights"_a.noconvert(),
@@ -246,8 +242,7 @@ void bind_poses(nb::module_& module) {
         *out.as<Pose>() = pose_behind(pose(object), points(outline), heading, shift, distance);
         return out.give();
       },
-      "pose"_a.noconvert(), "outline"_a.noconvert(), "heading"_a, "shift"_a, "distance"_a,
-      kOwned);
+      "pose"_a.noconvert(), "outline"_a.noconvert(), "heading"_a, "shift"_a, "distance"_a, kOwned);
   module.def(
       "pushable_moves",
       [](const Floats<3>& middles, const Array<const bool, 2>& is_open, const Floats<1>& shifts,
@@ -275,10 +270,10 @@ void bind_poses(nb::module_& module) {
             new (self) RouteSearch({step, turn_cost, arm}, shape, tight, among,
                                    {poses(objects), bodies.objects, bodies.radii, view(weights)});
           },
-          "step"_a, "turn_cost"_a, "arm"_a, "shape"_a, "tight"_a, "among"_a,
-          "poses"_a.noconvert(), "bodies"_a, "weights"_a.noconvert(), nb::keep_alive<1, 5>(),
-          nb::keep_alive<1, 6>(), nb::keep_alive<1, 7>(), nb::keep_alive<1, 8>(),
-          nb::keep_alive<1, 9>(), nb::keep_alive<1, 10>())
+          "step"_a, "turn_cost"_a, "arm"_a, "shape"_a, "tight"_a, "among"_a, "poses"_a.noconvert(),
+          "bodies"_a, "weights"_a.noconvert(), nb::keep_alive<1, 5>(), nb::keep_alive<1, 6>(),
+          nb::keep_alive<1, 7>(), nb::keep_alive<1, 8>(), nb::keep_alive<1, 9>(),
+          nb::keep_alive<1, 10>())
       .def(
           "cheapest_legs",
           [](RouteSearch& self, const Points& line, double heading, double end, Index first,
@@ -381,8 +376,8 @@ void bind_pushes(nb::module_& module) {
                               steps.give(size.stages), stages.give(size.stages),
                               lengths.give(size.stages), box.give());
           },
-          "start"_a.noconvert(), "poses"_a.noconvert(), "target"_a, "path"_a.noconvert(),
-          "shift"_a, "limit"_a, "wanted"_a.noconvert(), "controller"_a, "longest"_a,
+          "start"_a.noconvert(), "poses"_a.noconvert(), "target"_a, "path"_a.noconvert(), "shift"_a,
+          "limit"_a, "wanted"_a.noconvert(), "controller"_a, "longest"_a,
           "(T, 3) poses of the robot, at most `longest`; (S,) how many of them each stage has; "
           "(S, K, 3) the objects and (S, K) their path lengths at its end [m]; (4,) the box around "
           "all that moved and its surroundings [m].");

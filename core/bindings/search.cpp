@@ -43,8 +43,7 @@ void bind_search(nb::module_& module) {
   nb::class_<GridDijkstra>(module, "GridDijkstra", "Dijkstra's algorithm over the cells of a grid.")
       .def(
           "__init__",
-          [](GridDijkstra* self, const Floats<2>& weights, double cell,
-             const Integers<1>& starts) {
+          [](GridDijkstra* self, const Floats<2>& weights, double cell, const Integers<1>& starts) {
             new (self) GridDijkstra(view(weights), cell, view(starts));
           },
           "weights"_a.noconvert(), "cell"_a, "starts"_a.noconvert(), nb::keep_alive<1, 2>())
@@ -59,15 +58,17 @@ void bind_search(nb::module_& module) {
           [](const GridDijkstra& self) {
             const auto costs = self.costs();
             auto* owned = new std::vector<double>(costs.data(), costs.data() + costs.size());
-            nb::capsule owner(owned,
-                              [](void* p) noexcept { delete static_cast<std::vector<double>*>(p); });
+            nb::capsule owner(
+                owned, [](void* p) noexcept { delete static_cast<std::vector<double>*>(p); });
             return nb::ndarray<nb::numpy, double, nb::ndim<2>>(
                 owned->data(),
-                {static_cast<std::size_t>(costs.extent(0)), static_cast<std::size_t>(costs.extent(1))},
+                {static_cast<std::size_t>(costs.extent(0)),
+                 static_cast<std::size_t>(costs.extent(1))},
                 owner);
           },
           kOwned)
-      .def_prop_ro("parents", [](const GridDijkstra& self) { return copied(self.parents()); }, kOwned)
+      .def_prop_ro(
+          "parents", [](const GridDijkstra& self) { return copied(self.parents()); }, kOwned)
       .def_prop_ro("order", [](const GridDijkstra& self) { return copied(self.order()); }, kOwned);
 }
 

@@ -2,6 +2,7 @@
 
 Hooks of PEP 517 and PEP 660. Where no C++ compiler is found, the wheel ``ziglang`` becomes a build
 requirement, and scripts in the temporary folder call it by the names that CMake looks for.
+``CXX=zig`` asks for it: such a wheel runs with an older C library than that of the machine.
 """
 
 from __future__ import annotations
@@ -24,7 +25,9 @@ _TOOLS = {"CXX": "c++", "AR": "ar", "RANLIB": "ranlib"}
 
 def _needs_zig() -> bool:
     named = os.environ.get("CXX")
-    return named is None and not any(shutil.which(name) for name in _COMPILERS)
+    if sys.platform != "linux":
+        return False
+    return named == "zig" or (named is None and not any(map(shutil.which, _COMPILERS)))
 
 
 def _requirements(ask: Any, settings: dict[str, Any] | None) -> list[str]:

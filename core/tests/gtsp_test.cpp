@@ -161,9 +161,8 @@ void segment_swaps_gain_what_they_say() {
     std::vector<Index> nodes = order;
     const double before = length_of(order, costs);
     SegmentSwaps swaps;
-    const double gain =
-        swaps.improve(costs, {near.data(), {count, count - 1}}, 1 + random.below(count - 1), order,
-                      nodes, symmetric, 1e-12);
+    const double gain = swaps.improve(costs, {near.data(), {count, count - 1}},
+                                      1 + random.below(count - 1), order, nodes, symmetric, 1e-12);
     CHECK(order == nodes);
     CHECK(near_to(length_of(order, costs), before - gain));
     std::sort(order.begin(), order.end());

@@ -2,12 +2,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <utility>
 #include <vector>
 
 #include "check.hpp"
 #include "pushplan/random.hpp"
 #include "pushplan/search/astar.hpp"
+#include "pushplan/search/grid_dijkstra.hpp"
 
 namespace pushplan {
 namespace {
@@ -152,6 +154,52 @@ void heaps_are_in_order() {
   }
 }
 
+/// Costs of small grids, in one batch or many, are those of relaxing all moves.
+void grid_costs_are_least() {
+  constexpr Index kRows = 6;
+  constexpr Index kColumns = 7;
+  constexpr Index kCells = kRows * kColumns;
+  Xorshift64Star random(6);
+  const auto no_goals = std::make_unique<bool[]>(kCells);
+  for (int trial = 0; trial < 100; ++trial) {
+    std::vector<double> weights(kCells);
+    for (double& weight : weights) {
+      weight = random.below(4) == 0 ? kInfinity : 0.5 + random.uniform();
+    }
+    const std::vector<Index> starts{random.below(kCells), random.below(kCells)};
+    std::vector<double> exact(kCells, kInfinity);
+    for (const Index start : starts) exact[at(start)] = 0.0;
+    for (bool changed = true; changed;) {
+      changed = false;
+      for (Index cell = 0; cell < kCells * kCells; ++cell) {
+        const Index from = cell / kCells;
+        const Index to = cell % kCells;
+        const Index down = std::abs(from / kColumns - to / kColumns);
+        const Index across = std::abs(from % kColumns - to % kColumns);
+        if (std::max(down, across) != 1) continue;
+        const double length = 0.2 * std::sqrt(static_cast<double>(down + across));
+        const double cost = exact[at(from)] + length * weights[at(to)];
+        if (!(cost < exact[at(to)] - 1e-12)) continue;
+        exact[at(to)] = cost;
+        changed = true;
+      }
+    }
+    GridDijkstra search({weights.data(), {kRows, kColumns}}, 0.2, starts);
+    const Index batch = 1 + random.below(kCells);
+    Index upto = batch;
+    while (search.settle({no_goals.get(), {kRows, kColumns}}, upto)) upto += batch;
+    double last = 0.0;
+    for (const Index cell : search.order()) {
+      const double cost = search.costs().data()[cell];
+      CHECK(near_to(cost, exact[at(cell)]) && cost >= last);
+      last = cost;
+    }
+    for (Index cell = 0; cell < kCells; ++cell) {
+      CHECK((search.costs().data()[cell] == kInfinity) == (exact[at(cell)] == kInfinity));
+    }
+  }
+}
+
 }  // namespace
 }  // namespace pushplan
 
@@ -160,5 +208,6 @@ int main() {
   pushplan::better_bounds_expand_fewer_nodes();
   pushplan::without_a_start_there_is_no_path();
   pushplan::heaps_are_in_order();
+  pushplan::grid_costs_are_least();
   return pushplan::tests::finish();
 }

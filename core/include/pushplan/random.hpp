@@ -25,9 +25,7 @@ class Xorshift64Star {
   }
 
   /// A whole number from 0 to `count - 1`.
-  Index below(Index count) {
-    return static_cast<Index>(uniform() * static_cast<double>(count));
-  }
+  Index below(Index count) { return static_cast<Index>(uniform() * static_cast<double>(count)); }
 
  private:
   std::uint64_t state_;

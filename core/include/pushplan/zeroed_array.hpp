@@ -16,7 +16,8 @@ template <class T>
 class ZeroedArray {
  public:
   explicit ZeroedArray(Index size)
-      : values_(static_cast<T*>(std::calloc(static_cast<std::size_t>(size > 0 ? size : 1), sizeof(T)))) {
+      : values_(static_cast<T*>(
+            std::calloc(static_cast<std::size_t>(size > 0 ? size : 1), sizeof(T)))) {
     if (!values_) throw std::bad_alloc();
   }
 

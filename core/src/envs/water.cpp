@@ -41,8 +41,8 @@ void flow_shapes(const Polygons& bodies, std::span<FlowShape> out) {
       const double ex = b.x - a.x;
       const double ey = b.y - a.y;
       const double length = std::hypot(ex, ey);
-      // t is measured along the edge from the foot of the perpendicular: its speed of rotation meets
-      // the water head on (a plate of half length a about its middle has a^4 / 2)
+      // t is measured along the edge from the foot of the perpendicular: its speed of rotation
+      // meets the water head on (a plate of half length a about its middle has a^4 / 2)
       const double s = (a.x * ex + a.y * ey) / length;
       const double t = (b.x * ex + b.y * ey) / length;
       const double cross = a.x * b.y - a.y * b.x;

@@ -74,8 +74,8 @@ void ShadowPainter::fill_one(ArrayView<std::uint8_t, 2> mask, Vec2 eye, Polygon 
   const double ay = corners[first].y - eye.y;
   const double bx = corners[last].x - eye.x;
   const double by = corners[last].y - eye.y;
-  const double far = 4.0 * (static_cast<double>(mask.extent(0) + mask.extent(1)) +
-                            std::abs(eye.x) + std::abs(eye.y));
+  const double far = 4.0 * (static_cast<double>(mask.extent(0) + mask.extent(1)) + std::abs(eye.x) +
+                            std::abs(eye.y));
   const double a = far / std::hypot(ax, ay);
   const double b = far / std::hypot(bx, by);
   // the direction of the middle of the shadow

@@ -1,10 +1,10 @@
 // Shortest paths through the layers of a tour, kept up to date while clusters come and go.
 //
 // `ahead(c, v)` is the cost of the cheapest path from the root's node along the tour to node v of
-// cluster c, `behind(c, v)` of that from there to the root. A change moves all values past it by what
-// the tour costs more. That amount is carried by the cluster beside the change instead (both its
-// values are lowered by `carry[c]`), so that only a few values have to be renewed, up to where they
-// agree with the old ones; and in every gap of the tour the cheapest path across costs 0.
+// cluster c, `behind(c, v)` of that from there to the root. A change moves all values past it by
+// what the tour costs more. That amount is carried by the cluster beside the change instead (both
+// its values are lowered by `carry[c]`), so that only a few values have to be renewed, up to where
+// they agree with the old ones; and in every gap of the tour the cheapest path across costs 0.
 #pragma once
 
 #include <algorithm>
@@ -22,8 +22,9 @@ inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 inline std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
-/// Fills `out[w]` with the least of `values[v] + costs(from + v, to + w)` over v, for w below `n_to`,
-/// four columns at a time. Up to `kSpare` numbers past `n_to` are written too and mean nothing.
+/// Fills `out[w]` with the least of `values[v] + costs(from + v, to + w)` over v, for w below
+/// `n_to`, four columns at a time. Up to `kSpare` numbers past `n_to` are written too and mean
+/// nothing.
 inline void push_values(const ArrayView<const double, 2>& costs, const double* values, Index from,
                         Index n_from, Index to, Index n_to, double* out) {
   const Index stride = costs.extent(1);

@@ -179,9 +179,7 @@ void RuinRecreate::start(std::span<const Index> order) {
   if (current_.cost < best_.cost) best_ = current_;
 }
 
-void RuinRecreate::start_from_best() {
-  current_ = best_;
-}
+void RuinRecreate::start_from_best() { current_ = best_; }
 
 void RuinRecreate::narrow(const Problem& problem, std::span<const Index> kept) {
   for (ClusterTour* tour : {&current_, &best_}) {
@@ -224,8 +222,8 @@ void RuinRecreate::note_best(double tolerance) {
   };
   double cost = choose();
   if (cost < best_.cost - tolerance) {
-    const double gain = work.swaps.improve(problem_.costs, problem_.near, work.reach,
-                                           work.order, work.nodes, problem_.symmetric, tolerance);
+    const double gain = work.swaps.improve(problem_.costs, problem_.near, work.reach, work.order,
+                                           work.nodes, problem_.symmetric, tolerance);
     if (gain != 0.0) {
       std::rotate(work.order.begin(),
                   std::find(work.order.begin(), work.order.end(), work.layers.root()),

@@ -65,8 +65,8 @@ class Samples {
 
 }  // namespace
 
-void cover_objects(std::span<const Pose> poses, const Polygons& outlines,
-                   const RasterFrame& frame, Coverage out) {
+void cover_objects(std::span<const Pose> poses, const Polygons& outlines, const RasterFrame& frame,
+                   Coverage out) {
   Samples samples(frame, out);
   std::vector<Vec2> corners(outlines.vertices.size());
   transform(poses, outlines, corners.data());
@@ -89,8 +89,8 @@ void cover_sweep(std::span<const Pose> path, const Polygons& robot, const Raster
     Index steps = 1;
     if (n > 0) {
       const double length = std::hypot(to.x - from.x, to.y - from.y);
-      steps = std::max(Index{1},
-                       ceil_index((length + std::abs(turn) * reach) / (0.5 * frame.cell)));
+      steps =
+          std::max(Index{1}, ceil_index((length + std::abs(turn) * reach) / (0.5 * frame.cell)));
     }
     for (Index step = 0; step < steps; ++step) {
       const double back = static_cast<double>(step) / static_cast<double>(steps);

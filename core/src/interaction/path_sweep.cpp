@@ -23,8 +23,7 @@ class ChosenFloes {
       masses_.push_back(all.masses[at(k)]);
       inverse_gyration_.push_back(all.inverse_gyration[at(k)]);
     }
-    bodies = {all.hull,        all.hull_radius, {vertices_, offsets_}, radii_,
-              masses_, inverse_gyration_};
+    bodies = {all.hull, all.hull_radius, {vertices_, offsets_}, radii_, masses_, inverse_gyration_};
   }
   ChosenFloes(const ChosenFloes&) = delete;
   ChosenFloes& operator=(const ChosenFloes&) = delete;

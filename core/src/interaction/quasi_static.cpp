@@ -196,7 +196,8 @@ bool QuasiStatic::advance(const Pose& robot_from, const Pose& robot_to, std::spa
   const double reach = bodies_.robot_radius + 0.5 * distance;
   gather(middle, reach + kNearby * bodies_.robot_radius, poses);
   if (touching(middle, reach, poses) == 0) return true;
-  const Index steps = std::max<Index>(1, static_cast<Index>(std::ceil(motion / settings_.max_step)));
+  const Index steps =
+      std::max<Index>(1, static_cast<Index>(std::ceil(motion / settings_.max_step)));
   Pose here = robot_from;
   for (Index step = 1; step <= steps; ++step) {
     const double part = static_cast<double>(step) / static_cast<double>(steps);
@@ -246,8 +247,7 @@ Index QuasiStatic::sweep(std::span<const Pose> path, std::span<Pose> poses,
   Index jammed = -1;
   std::copy(poses.begin(), poses.end(), out.row(0).begin());
   for (std::size_t n = 1; n < path.size(); ++n) {
-    if (jammed < 0 &&
-        (robot_held(path[n]) || !advance(path[n - 1], path[n], poses, unused_))) {
+    if (jammed < 0 && (robot_held(path[n]) || !advance(path[n - 1], path[n], poses, unused_))) {
       jammed = static_cast<Index>(n);
     }
     std::copy(poses.begin(), poses.end(), out.row(static_cast<Index>(n)).begin());

@@ -72,7 +72,8 @@ inline double separate(const Contacts& contacts, const MovedBody& a, const Moved
 }
 
 /// Coulomb friction: carries the contact of a body sideways with what it touches, which has moved
-/// `from` `to`, up to `limit` [m], which is friction times what the body was moved along the normal.
+/// `from` `to`, up to `limit` [m], which is friction times what the body was moved along the
+/// normal.
 inline void drag_along(const Contacts& contacts, double limit, const Pose& from, const Pose& to,
                        const Pose& before, const MovedBody& body) {
   Vec2 p = contacts.points[0].point;
@@ -89,8 +90,8 @@ inline void drag_along(const Contacts& contacts, double limit, const Pose& from,
   };
   const double wanted = slide(from, to) - slide(before, body.pose);
   const double arm = body.arm(p, t);
-  const double by = std::min(
-      std::max(wanted / (1.0 + arm * arm * body.inverse_gyration), -limit), limit);
+  const double by =
+      std::min(std::max(wanted / (1.0 + arm * arm * body.inverse_gyration), -limit), limit);
   body.nudge(p, {by * t.x, by * t.y});
 }
 

@@ -38,12 +38,12 @@ struct Sides {
   double last;
 };
 
-constexpr std::array<Sides, 6> kSides{{{1.0, 0.0, 1.0},      // LSL
-                                       {-1.0, 0.0, -1.0},    // RSR
-                                       {1.0, 0.0, -1.0},     // LSR
-                                       {-1.0, 0.0, 1.0},     // RSL
-                                       {-1.0, 1.0, -1.0},    // RLR
-                                       {1.0, -1.0, 1.0}}};   // LRL
+constexpr std::array<Sides, 6> kSides{{{1.0, 0.0, 1.0},     // LSL
+                                       {-1.0, 0.0, -1.0},   // RSR
+                                       {1.0, 0.0, -1.0},    // LSR
+                                       {-1.0, 0.0, 1.0},    // RSL
+                                       {-1.0, 1.0, -1.0},   // RLR
+                                       {1.0, -1.0, 1.0}}};  // LRL
 
 }  // namespace
 

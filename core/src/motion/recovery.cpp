@@ -11,8 +11,8 @@
 namespace pushplan {
 namespace {
 
-constexpr double kCell = 0.6;        // sides of the boxes of poses of which one is looked at [steps]
-constexpr double kReach = 3.0;       // greatest distance of the place to turn [radii]
+constexpr double kCell = 0.6;   // sides of the boxes of poses of which one is looked at [steps]
+constexpr double kReach = 3.0;  // greatest distance of the place to turn [radii]
 constexpr Index kMostPoses = 100'000;
 constexpr double kClearance = 1.05;  // that the robot needs to turn about [radii]
 constexpr double kDeeper = 1e-3;     // by how much it may get deeper into what it touches [radii]

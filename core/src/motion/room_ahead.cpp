@@ -53,7 +53,8 @@ bool RoomExploration::drive(const Pose& from, const Arc& move, Pose& end) {
 /// The number of the box of a pose.
 Index RoomExploration::box_of(const Pose& pose) const {
   const Pose& start = nodes_.front().pose;
-  const Index column = boxes_.half + static_cast<Index>(std::rint((pose.x - start.x) / boxes_.side));
+  const Index column =
+      boxes_.half + static_cast<Index>(std::rint((pose.x - start.x) / boxes_.side));
   const Index row = boxes_.half + static_cast<Index>(std::rint((pose.y - start.y) / boxes_.side));
   const Index heading =
       floor_mod(floor_index(floor_mod(pose.theta, kTurn) / boxes_.turn), boxes_.headings);
@@ -96,7 +97,8 @@ RoomExploration::Outcome RoomExploration::run(Index upto) {
 std::vector<Arc> RoomExploration::arcs() const {
   std::vector<Arc> arcs;
   for (Index at = away_; at > 0; at = nodes_[static_cast<std::size_t>(at)].before) {
-    arcs.push_back(rules_.moves[static_cast<std::size_t>(nodes_[static_cast<std::size_t>(at)].move)]);
+    arcs.push_back(
+        rules_.moves[static_cast<std::size_t>(nodes_[static_cast<std::size_t>(at)].move)]);
   }
   std::reverse(arcs.begin(), arcs.end());
   return arcs;

@@ -7,10 +7,10 @@
 namespace pushplan {
 namespace {
 
-constexpr double kToEnd = 0.2;       // share of candidates with another end,
-constexpr double kThrough = 0.65;    // and of these with those that lead through another pose
-constexpr double kInside = 0.999;    // distance of an end from the centre of a goal [radii]
-constexpr double kMostShift = 0.5;   // greatest change of an end's heading for the turn to it [rad]
+constexpr double kToEnd = 0.2;      // share of candidates with another end,
+constexpr double kThrough = 0.65;   // and of these with those that lead through another pose
+constexpr double kInside = 0.999;   // distance of an end from the centre of a goal [radii]
+constexpr double kMostShift = 0.5;  // greatest change of an end's heading for the turn to it [rad]
 
 double sign(double x) { return x > 0.0 ? 1.0 : (x < 0.0 ? -1.0 : 0.0); }
 

@@ -203,7 +203,8 @@ void cut_cells(const Discs& discs, const IceWater& water, const OutlinesOut& cel
       const double dx = discs.centres[other].x - centre.x;
       const double dy = discs.centres[other].y - centre.y;
       const double far = std::hypot(dx, dy);
-      const double power = discs.radii[k] * discs.radii[k] - discs.radii[other] * discs.radii[other];
+      const double power =
+          discs.radii[k] * discs.radii[k] - discs.radii[other] * discs.radii[other];
       const double away = 0.5 * (far + power / far - water.gap);
       const Vec2 u{dx / far, dy / far};
       cell.clip(u, u.x * centre.x + u.y * centre.y + away);

@@ -24,8 +24,8 @@ struct BodyDrag {
   Drag rotation;
 };
 
-/// Solves v' = -(b + c |v|) v over `h` [s] for the translation and the rotation of each body. A body
-/// that keeps nothing stands still then.
+/// Solves v' = -(b + c |v|) v over `h` [s] for the translation and the rotation of each body. A
+/// body that keeps nothing stands still then.
 void slow_down(std::span<const Twist> velocities, std::span<const double> keeps,  // 0 or 1
                std::span<const BodyDrag> drag, double h, std::span<Twist> out);
 

@@ -47,7 +47,7 @@ class Reach {
                     std::span<const Pose> objects, const Obstacles& obstacles);
 
   /// Marks the objects that were left out although something that moved came to overlap them.
-  void struck(std::span<const bool> loaded,   // (K,) which objects were simulated
+  void struck(std::span<const bool> loaded,    // (K,) which objects were simulated
               ArrayView<const Pose, 2> paths,  // (T, K); those of the others do not change
               std::span<const Pose> before,    // (K,) poses before the step
               std::span<bool> found);          // (K,) filled

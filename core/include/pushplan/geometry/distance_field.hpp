@@ -36,8 +36,8 @@ void fill_distances(ArrayView<double, 2> out, const Cells& cells, const Nodes& n
 /// read its nearest cell. Infinite where there is no way.
 ///
 /// A distance to a goal changes by at most the step between free neighbours; where the four cells
-/// around the point differ by more, or one is not finite, a wall lies between them and the cell that
-/// holds the point counts alone, or if it has no value the least of the others.
+/// around the point differ by more, or one is not finite, a wall lies between them and the cell
+/// that holds the point counts alone, or if it has no value the least of the others.
 double sample(ArrayView<const double, 2> values, const Cells& cells, Vec2 p);
 /// Reads it at many points.
 void sample(ArrayView<const double, 2> values, const Cells& cells, std::span<const Vec2> points,

@@ -1,8 +1,8 @@
 // Static obstacles: convex cores, each with a radius around it.
 //
-// A thick segment is exactly the points within its radius of its centre line, and a polygon grown by
-// a clearance the points within that clearance of the polygon. Both are a core (2 or more corners)
-// and a radius, so distances and lines of sight need no approximation of round corners.
+// A thick segment is exactly the points within its radius of its centre line, and a polygon grown
+// by a clearance the points within that clearance of the polygon. Both are a core (2 or more
+// corners) and a radius, so distances and lines of sight need no approximation of round corners.
 #pragma once
 
 #include <span>

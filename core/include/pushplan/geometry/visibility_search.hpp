@@ -3,10 +3,10 @@
 // A node is a corner of an outline around an obstacle. When one is reached, its successors are the
 // corners that a common tangent leads to; they are put into the heap untested, and whether nothing
 // lies between is found out for the cheapest entry only (Dellin and Srinivasa 2016, "A unifying
-// formalism for shortest path problems with expensive edge evaluations"). Nor are all successors put
-// there at once: those through which the way to the goal would be much longer wait until it is their
-// turn (Yoshizumi, Miura and Ishida 2000, "A* with partial expansion for large branching factor
-// problems"). Most of the graph is never made.
+// formalism for shortest path problems with expensive edge evaluations"). Nor are all successors
+// put there at once: those through which the way to the goal would be much longer wait until it is
+// their turn (Yoshizumi, Miura and Ishida 2000, "A* with partial expansion for large branching
+// factor problems"). Most of the graph is never made.
 #pragma once
 
 #include <span>
@@ -30,8 +30,8 @@ struct Corners {
   Bends bends() const { return {points, incoming, outgoing}; }
 };
 
-/// A search from one start to one goal, which can be taken up again. What it is given has to outlive
-/// it.
+/// A search from one start to one goal, which can be taken up again. What it is given has to
+/// outlive it.
 class VisibilitySearch {
  public:
   enum class Outcome { kFound, kExhausted, kPaused };
@@ -40,8 +40,8 @@ class VisibilitySearch {
 
   VisibilitySearch(Vec2 start, const Corners& corners, const GoalScene& scene,
                    const ObstacleGrid& grid,
-                   double sliver);  // a place this close to an obstacle may be inside of the outline
-                                    // around it [m]
+                   double sliver);  // a place this close to an obstacle may be inside of the
+                                    // outline around it [m]
 
   /// Goes on for about `budget` corners looked at, or lines tested.
   Outcome run(Index budget);
@@ -79,8 +79,9 @@ class VisibilitySearch {
   double cell_;
   double sliver_;
   GridSight sight_;
-  std::vector<double> bounds_;  // (C,) from any corner of an obstacle at least as far to the goal [m]
-  std::vector<char> done_;      // (V + E,)
+  std::vector<double>
+      bounds_;              // (C,) from any corner of an obstacle at least as far to the goal [m]
+  std::vector<char> done_;  // (V + E,)
   std::vector<Index> parents_;
   std::vector<Entry> heap_;
   Index entries_ = 0;

@@ -33,17 +33,18 @@ struct Problem {
 
 /// Marks the nodes that a tour may need: 0 in `needed`, (N,) and full of ones before, for a node
 /// whose arcs all cost as much as those of another node of its cluster, or more. Of nodes that cost
-/// the same the last is kept. Ends after 16 N^2 comparisons; what is not looked at counts as needed.
+/// the same the last is kept. Ends after 16 N^2 comparisons; what is not looked at counts as
+/// needed.
 void mark_needed(ArrayView<const double, 2> costs,    // (N, N); infinite forbids an arc
                  ArrayView<const double, 2> reverse,  // (N, N) the transpose
                  std::span<const Index> offsets, std::span<Index> needed);
 
-/// Finds the cheapest nodes for a closed order of at least two clusters (Fischetti, Salazar and Toth
-/// 1997): a shortest path through the layers of nodes, for every node of `order[0]`, which should be
-/// a small cluster. Returns the cost.
+/// Finds the cheapest nodes for a closed order of at least two clusters (Fischetti, Salazar and
+/// Toth 1997): a shortest path through the layers of nodes, for every node of `order[0]`, which
+/// should be a small cluster. Returns the cost.
 double best_nodes(ArrayView<const double, 2> costs,  // (N, N + kSpare)
                   std::span<const Index> offsets, std::span<const Index> order,
-                  std::span<Index> nodes,         // as many as clusters in the order; filled
-                  ArrayView<double, 2> layers);   // (m, K + kSpare) working memory
+                  std::span<Index> nodes,        // as many as clusters in the order; filled
+                  ArrayView<double, 2> layers);  // (m, K + kSpare) working memory
 
 }  // namespace pushplan::gtsp

@@ -26,13 +26,13 @@ struct ClusterTour {
   double cost;
 };
 
-/// Simulated annealing by ruin and recreate (Christiaens and Vanden Berghe 2020, "Slack induction by
-/// string removals"). The problem's arrays have to outlive the search.
+/// Simulated annealing by ruin and recreate (Christiaens and Vanden Berghe 2020, "Slack induction
+/// by string removals"). The problem's arrays have to outlive the search.
 class RuinRecreate {
  public:
   /// Begins with this order, whose first cluster, the root, should be small. No tour is known yet.
-  RuinRecreate(const Problem& problem, const RuinRecreateOptions& options,
-               std::vector<Index> order, std::uint64_t seed);
+  RuinRecreate(const Problem& problem, const RuinRecreateOptions& options, std::vector<Index> order,
+               std::uint64_t seed);
   ~RuinRecreate();
   RuinRecreate(const RuinRecreate&) = delete;
   RuinRecreate& operator=(const RuinRecreate&) = delete;
@@ -43,7 +43,8 @@ class RuinRecreate {
   void start_from_best();
   /// Makes rounds at one temperature; costs within the tolerance count as equal.
   void run(double temperature, double tolerance, Index rounds);
-  /// Goes on with another problem of the same clusters: `kept` are the nodes that it has of this one.
+  /// Goes on with another problem of the same clusters: `kept` are the nodes that it has of this
+  /// one.
   void narrow(const Problem& problem, std::span<const Index> kept);
 
   const ClusterTour& current() const { return current_; }

@@ -1,10 +1,10 @@
 // Lower bounds by relaxed tours, and the few paths that they leave.
 //
-// A walk of m arcs from the root to the root may come to a cluster twice, but not while it remembers
-// it: at each cluster d it knows those on the short list `lists[d]` (the ng-route relaxation of
-// Baldacci, Mingozzi and Roberti 2011). A memory M is a bit mask over that list. Everything is
-// numbered without the root: n clusters of at most K nodes, padded with infinite costs, b clusters
-// on a list.
+// A walk of m arcs from the root to the root may come to a cluster twice, but not while it
+// remembers it: at each cluster d it knows those on the short list `lists[d]` (the ng-route
+// relaxation of Baldacci, Mingozzi and Roberti 2011). A memory M is a bit mask over that list.
+// Everything is numbered without the root: n clusters of at most K nodes, padded with infinite
+// costs, b clusters on a list.
 #pragma once
 
 #include <span>
@@ -15,16 +15,16 @@ namespace pushplan::gtsp {
 
 /// Clusters that walks come to.
 struct WalkClusters {
-  std::span<const double> prices;  // (n,) what a visit of each earns
-  std::span<const Index> sizes;    // (n,) nodes of each
-  ArrayView<const Index, 3> moves; // (n, n, 2^b) the new memory with cluster d before a walk from e,
-                                   // -1 where that walk remembers d
+  std::span<const double> prices;   // (n,) what a visit of each earns
+  std::span<const Index> sizes;     // (n,) nodes of each
+  ArrayView<const Index, 3> moves;  // (n, n, 2^b) the new memory with cluster d before a walk from
+                                    // e, -1 where that walk remembers d
 };
 
 /// Puts a node of clusters `low` to `high - 1` in front of every walk to the root.
-void extend_walks(ArrayView<const double, 3> walks,    // (n, 2^b, K) cheapest walks of k arcs
-                  ArrayView<double, 3> longer,         // (n, 2^b, K) filled with those of k + 1
-                  ArrayView<const double, 4> blocks,   // (n, K, n, K) to a node, from a node
+void extend_walks(ArrayView<const double, 3> walks,   // (n, 2^b, K) cheapest walks of k arcs
+                  ArrayView<double, 3> longer,        // (n, 2^b, K) filled with those of k + 1
+                  ArrayView<const double, 4> blocks,  // (n, K, n, K) to a node, from a node
                   const WalkClusters& clusters, Index low, Index high);
 
 /// Finds how often the cheapest walk from the root through n nodes and back comes to each cluster.
@@ -33,7 +33,7 @@ double read_visits(ArrayView<const double, 4> walks,   // (n, n, 2^b, K) by numb
                    ArrayView<const double, 2> first,   // (n, K) from the root to each node
                    ArrayView<const double, 4> blocks,  // (n, K, n, K)
                    const WalkClusters& clusters,
-                   std::span<Index> visits);           // (n,) filled
+                   std::span<Index> visits);  // (n,) filled
 
 /// Partial tours of one length, from the root; structure of arrays.
 template <class Number, class Integer>

@@ -1,9 +1,9 @@
 // Contacts of a crowd of convex bodies within one small step: found once, solved often.
 //
 // Bodies rest unless something moves them. In a step the hull moves by a known displacement; every
-// pair that comes near gets one or two contact points with a gap, and the displacements of the bodies
-// are those that close no gap beyond zero with the least total motion and Coulomb friction, by
-// projected Gauss-Seidel on accumulated impulses (Catto, "Iterative Dynamics with Temporal
+// pair that comes near gets one or two contact points with a gap, and the displacements of the
+// bodies are those that close no gap beyond zero with the least total motion and Coulomb friction,
+// by projected Gauss-Seidel on accumulated impulses (Catto, "Iterative Dynamics with Temporal
 // Coherence", 2005, with velocities that start from zero). Pairs are looked for only around bodies
 // that move.
 #pragma once
@@ -19,9 +19,9 @@ namespace pushplan {
 
 /// A hull among K floes.
 struct IceBodies {
-  Polygons hull;       // convex parts in its body frame
-  double hull_radius;  // circumscribed [m]
-  Polygons floes;      // outlines in their body frames
+  Polygons hull;                             // convex parts in its body frame
+  double hull_radius;                        // circumscribed [m]
+  Polygons floes;                            // outlines in their body frames
   std::span<const double> radii;             // (K,) circumscribed radii [m]
   std::span<const double> masses;            // (K,) [kg]
   std::span<const double> inverse_gyration;  // (K,) 1 / c^2 [1/m^2], c^2 being inertia over mass

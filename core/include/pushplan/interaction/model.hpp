@@ -24,8 +24,8 @@ concept InteractionModel =
       model.reset_tests();
     };
 
-/// Floes that push floes; nothing holds the hull. It remembers for which poses it has worked out the
-/// corners of the floes.
+/// Floes that push floes; nothing holds the hull. It remembers for which poses it has worked out
+/// the corners of the floes.
 class IceInteraction {
  public:
   IceInteraction(const IceBodies& bodies, const IceSettings& settings);
@@ -48,8 +48,8 @@ class IceInteraction {
 /// Any other model, behind a function.
 class CalledInteraction {
  public:
-  /// As `advance` of a model, over arrays of `count` objects. Where it returns false, it has changed
-  /// neither of them.
+  /// As `advance` of a model, over arrays of `count` objects. Where it returns false, it has
+  /// changed neither of them.
   using Advance = bool (*)(void* context, Index count, const Pose* from, const Pose* to,
                            Pose* poses, double* lengths);
 
@@ -57,8 +57,7 @@ class CalledInteraction {
                     std::span<const double> inverse_masses)
       : advance_(advance), context_(context), radii_(radii), inverse_masses_(inverse_masses) {}
 
-  bool advance(const Pose& from, const Pose& to, std::span<Pose> poses,
-               std::span<double> lengths) {
+  bool advance(const Pose& from, const Pose& to, std::span<Pose> poses, std::span<double> lengths) {
     ++tests_;
     return advance_(context_, static_cast<Index>(poses.size()), &from, &to, poses.data(),
                     lengths.data());

@@ -17,8 +17,8 @@ struct RasterFrame {
 using Coverage = ArrayView<float, 2>;
 
 /// Writes the fraction of each cell that lies under an object. Outlines are in body frames [m].
-void cover_objects(std::span<const Pose> poses, const Polygons& outlines,
-                   const RasterFrame& frame, Coverage out);
+void cover_objects(std::span<const Pose> poses, const Polygons& outlines, const RasterFrame& frame,
+                   Coverage out);
 
 /// Writes the fraction of each cell that a robot passes over on a path of straight pieces; of one
 /// pose, its footprint.

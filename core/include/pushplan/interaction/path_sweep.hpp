@@ -7,8 +7,8 @@
 
 namespace pushplan {
 
-/// Writes the work on K objects from each of N poses of a robot to the next [kg m]. `swept`, (N, K),
-/// holds the objects at each pose.
+/// Writes the work on K objects from each of N poses of a robot to the next [kg m]. `swept`, (N,
+/// K), holds the objects at each pose.
 void step_works(ArrayView<const Pose, 2> swept, std::span<const double> masses,
                 std::span<double> works);
 

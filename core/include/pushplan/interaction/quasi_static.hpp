@@ -4,8 +4,8 @@
 // is removed by the motion that is least in the norm sum of m (dx^2 + dy^2 + c^2 dtheta^2), object
 // by object and point by point (projected Gauss-Seidel). That is Gauss's principle for bodies whose
 // velocity dies at once, so it is what a simulator with full damping computes, and it is the
-// ellipsoidal limit surface of Goyal, Ruina and Papadopoulos (1991) for a body pushed on the ground:
-// (v_x, v_y, omega) is proportional to (f_x, f_y, tau / c^2).
+// ellipsoidal limit surface of Goyal, Ruina and Papadopoulos (1991) for a body pushed on the
+// ground: (v_x, v_y, omega) is proportional to (f_x, f_y, tau / c^2).
 #pragma once
 
 #include <span>
@@ -18,10 +18,10 @@ namespace pushplan {
 
 /// A robot, K objects and walls.
 struct Bodies {
-  Polygons robot;        // convex parts in its body frame
-  Index wall_parts;      // number of the first parts, which count at walls: all but the wheels
-  double robot_radius;   // circumscribed [m]
-  Polygons objects;      // outlines in their body frames
+  Polygons robot;       // convex parts in its body frame
+  Index wall_parts;     // number of the first parts, which count at walls: all but the wheels
+  double robot_radius;  // circumscribed [m]
+  Polygons objects;     // outlines in their body frames
   std::span<const double> radii;             // (K,) circumscribed radii of the objects [m]
   std::span<const double> inverse_masses;    // (K,) [1/kg]
   std::span<const double> inverse_gyration;  // (K,) 1 / c^2 [1/m^2]
@@ -30,11 +30,11 @@ struct Bodies {
 };
 
 struct QuasiStaticSettings {
-  double max_step;   // longest motion of a robot corner in one resolution step [m]
-  double tolerance;  // overlap that counts as resolved [m]
-  double jam_depth;  // overlap that cannot be resolved and counts as a jam [m]
-  Index iterations;  // Gauss-Seidel rounds in one step
-  double friction;   // Coulomb coefficient between robot and objects
+  double max_step;         // longest motion of a robot corner in one resolution step [m]
+  double tolerance;        // overlap that counts as resolved [m]
+  double jam_depth;        // overlap that cannot be resolved and counts as a jam [m]
+  Index iterations;        // Gauss-Seidel rounds in one step
+  double friction;         // Coulomb coefficient between robot and objects
   double static_friction;  // and between objects and walls
 };
 
@@ -85,15 +85,15 @@ class QuasiStatic {
 
   Bodies bodies_;
   QuasiStaticSettings settings_;
-  std::vector<Vec2> robot_;         // corners of the robot in the world frame
-  std::vector<Vec2> outlines_;      // of the objects
-  std::vector<Index> active_;       // objects that may move in this step: the first `count_`
+  std::vector<Vec2> robot_;     // corners of the robot in the world frame
+  std::vector<Vec2> outlines_;  // of the objects
+  std::vector<Index> active_;   // objects that may move in this step: the first `count_`
   Index count_ = 0;
-  std::vector<Pose> before_;        // poses before this step
-  std::vector<Pose> saved_;         // of the objects nearby, before this small step
-  std::vector<Index> near_;         // objects nearby, in order: no other one is touched or moves
-  std::vector<double> unused_;      // lengths that `sweep` does not report
-  Vec2 near_centre_{};              // every object whose disc reaches into this disc is nearby
+  std::vector<Pose> before_;    // poses before this step
+  std::vector<Pose> saved_;     // of the objects nearby, before this small step
+  std::vector<Index> near_;     // objects nearby, in order: no other one is touched or moves
+  std::vector<double> unused_;  // lengths that `sweep` does not report
+  Vec2 near_centre_{};          // every object whose disc reaches into this disc is nearby
   double near_reach_ = 0.0;
   Index tests_ = 0;
 };

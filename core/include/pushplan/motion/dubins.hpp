@@ -52,8 +52,8 @@ struct DubinsPath {
 inline constexpr double kMaxTurn = 0.15;
 
 /// The shortest forward path between two poses under a least turning radius [m]. The six words are
-/// solved as in Shkel and Lumelsky, "Classification of the Dubins set" (2001), with the start at the
-/// origin and lengths in units of the radius.
+/// solved as in Shkel and Lumelsky, "Classification of the Dubins set" (2001), with the start at
+/// the origin and lengths in units of the radius.
 DubinsPath dubins(const Pose& start, const Pose& end, double radius);
 
 /// The pose at the end of an arc.
@@ -64,8 +64,7 @@ inline Pose along_arc(const Pose& start, const Arc& arc) {
   const double turn = arc.length * arc.curvature;
   const double half = 0.5 * turn;
   // chord of the arc; sin(x) / x keeps the straight limit exact
-  const double chord =
-      std::abs(half) < 1e-9 ? arc.length : arc.length * std::sin(half) / half;
+  const double chord = std::abs(half) < 1e-9 ? arc.length : arc.length * std::sin(half) / half;
   const double heading = start.theta + half;
   return {start.x + chord * std::cos(heading), start.y + chord * std::sin(heading),
           start.theta + turn};

@@ -19,7 +19,7 @@ struct PathProblem {
                           // it from any other
   double displacement;    // typical sideways displacement that shortcutting tries [m]
   GoalRegion goal;
-  Footprint footprint;    // with its margin
+  Footprint footprint;  // with its margin
   ConvexObstacles walls;
 };
 

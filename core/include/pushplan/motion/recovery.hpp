@@ -30,8 +30,8 @@ struct RecoveryProblem {
   double size;  // circumscribed radius of the robot [m]
 };
 
-/// The drive with the fewest steps to where the robot can turn, from its start on; empty if there is
-/// none.
+/// The drive with the fewest steps to where the robot can turn, from its start on; empty if there
+/// is none.
 std::vector<Pose> recovery_path(const RecoveryProblem& problem);
 
 }  // namespace pushplan

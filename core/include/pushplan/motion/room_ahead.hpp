@@ -22,16 +22,16 @@ struct Room {
 /// Moves that an exploration tries, and conditions that end it.
 struct RoomRules {
   std::span<const Arc> moves;  // to try from each pose
-  double reach;      // distance at which the robot has got away [m]
-  double clearance;  // of places to turn about that are looked for, 0 for none [m]
-  bool breadth;      // fewest moves first; else the last move from the last pose
+  double reach;                // distance at which the robot has got away [m]
+  double clearance;            // of places to turn about that are looked for, 0 for none [m]
+  bool breadth;                // fewest moves first; else the last move from the last pose
 };
 
 /// Boxes of poses of which one is looked at each.
 struct PoseBoxes {
-  double side;     // [m]
-  double turn;     // [rad]
-  Index half;      // boxes on each side of that of the start
+  double side;  // [m]
+  double turn;  // [rad]
+  Index half;   // boxes on each side of that of the start
   Index headings;
 };
 

@@ -1,8 +1,8 @@
 // Shortcutting of drivable paths at random with Dubins curves.
 //
-// A piece of the path is replaced by a Dubins path, straight across, through a displaced pose, or to
-// another end in the goal; the objects are swept along with the candidate from the piece on, and it
-// is kept when m0 l0 + w sum(mi li) falls. Shortcutting is Geraerts and Overmars (2007); what is
+// A piece of the path is replaced by a Dubins path, straight across, through a displaced pose, or
+// to another end in the goal; the objects are swept along with the candidate from the piece on, and
+// it is kept when m0 l0 + w sum(mi li) falls. Shortcutting is Geraerts and Overmars (2007); what is
 // added is that the cost of every candidate holds the interaction that it would cause.
 #pragma once
 

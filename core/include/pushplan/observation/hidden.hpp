@@ -7,12 +7,12 @@ namespace pushplan {
 
 /// Data for finding the corners of shortest paths that a robot sees.
 struct Sight {
-  Polygons loops;                     // convex outlines that cast shadows [m]
-  ArrayView<const float, 3> table;    // (rows, columns, corners) distances from the corners [m]
-  Vec2 origin;                        // of the table [m]
-  double step;                        // side of its cells [m]
-  std::span<const Index> bends;       // corners in sight
-  std::span<const double> lengths;    // paths to them [m]
+  Polygons loops;                   // convex outlines that cast shadows [m]
+  ArrayView<const float, 3> table;  // (rows, columns, corners) distances from the corners [m]
+  Vec2 origin;                      // of the table [m]
+  double step;                      // side of its cells [m]
+  std::span<const Index> bends;     // corners in sight
+  std::span<const double> lengths;  // paths to them [m]
 };
 
 /// Overwrites the pixels in the shadow of the loops, seen from `eye` [m], by the length of the path

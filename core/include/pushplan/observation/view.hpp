@@ -15,11 +15,11 @@ using Image = ArrayView<std::uint8_t, 2>;
 
 /// A window on the world: where the pixels of an image are.
 struct ImageView {
-  Pose window;         // its middle, and the direction that is up in the image; left in the image is a
-                       // quarter turn counter-clockwise from it
-  double rows;         // [px]
-  double cols;         // [px]
-  double step_up;      // length of a pixel up the image [m]
+  Pose window;     // its middle, and the direction that is up in the image; left in the image is a
+                   // quarter turn counter-clockwise from it
+  double rows;     // [px]
+  double cols;     // [px]
+  double step_up;  // length of a pixel up the image [m]
   double step_across;  // length of a pixel across it [m]
 };
 

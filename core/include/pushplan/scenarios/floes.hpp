@@ -62,19 +62,19 @@ void cut_cells(const Discs& discs, const IceWater& water, const OutlinesOut& cel
 /// Grows shapes of area 1 about the origin within their cells until they have their target areas
 /// [m^2], or cannot grow further. A floe has no corners where its cell has none.
 void fit_floes(const Outlines& shapes,
-               std::span<const Vec2> centres,  // (K,) [m]
-               const Outlines& cells,          // [m]
+               std::span<const Vec2> centres,    // (K,) [m]
+               const Outlines& cells,            // [m]
                std::span<const double> targets,  // (K,) areas [m^2]
                double stretch,  // greatest scale of a shape, in roots of its target area
                const OutlinesOut& floes);
 
 /// Places discs, largest first, off each other and off the regions, each at the first of its places
 /// that is free. Returns how many found one before the first that did not; `centres` holds theirs.
-Index place_discs(std::span<const double> radii,           // (K,) [m]
-                  ArrayView<const double, 3> draws,        // (K, T, 3) uniform in [0, 1): place, and
-                                                           // whether it is taken
-                  ArrayView<const double, 2> density,      // (R, C) chance that a place is taken,
-                                                           // over the water
+Index place_discs(std::span<const double> radii,       // (K,) [m]
+                  ArrayView<const double, 3> draws,    // (K, T, 3) uniform in [0, 1): place, and
+                                                       // whether it is taken
+                  ArrayView<const double, 2> density,  // (R, C) chance that a place is taken,
+                                                       // over the water
                   const IceWater& water, std::span<Vec2> centres);  // (K,) filled [m]
 
 }  // namespace pushplan

@@ -8,8 +8,8 @@
 
 namespace pushplan {
 
-/// A heap that tells each node where it is. Equal keys are taken in the order of the nodes' numbers:
-/// the same search on every machine.
+/// A heap that tells each node where it is. Equal keys are taken in the order of the nodes'
+/// numbers: the same search on every machine.
 ///
 /// The places are kept by whoever keeps the nodes: `place(node)` is a reference to an `Index`,
 /// `kNowhere` for a node that is not in the heap.

@@ -25,7 +25,8 @@ class SearchTree {
   };
 
   explicit SearchTree(Index size)
-      : nodes_(static_cast<Node*>(std::calloc(static_cast<std::size_t>(size > 0 ? size : 1), sizeof(Node)))),
+      : nodes_(static_cast<Node*>(
+            std::calloc(static_cast<std::size_t>(size > 0 ? size : 1), sizeof(Node)))),
         size_(size) {
     if (!nodes_) throw std::bad_alloc();
   }

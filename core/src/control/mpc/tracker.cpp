@@ -39,8 +39,8 @@ struct Cost {
     // later inputs have no influence, and may not be known yet
     for (std::size_t j = 0; j < row.size(); ++j) {
       if (row[j] == 0.0) continue;
-      const double input = j < count ? nominal[j].w / tuning.max_turn_rate
-                                     : nominal[j - count].v / tuning.max_speed;
+      const double input =
+          j < count ? nominal[j].w / tuning.max_turn_rate : nominal[j - count].v / tuning.max_speed;
       value -= row[j] * input;
     }
     for (std::size_t j = 0; j < row.size(); ++j) {
@@ -233,7 +233,8 @@ double Tracker::turning_speed() const {
 /// Moves the last solution on by the time that has passed since; NaN past its end.
 void Tracker::shift(double held) {
   horizon_.shift_steps(held);
-  for (std::size_t k = 0; k < horizon_.steps.size(); ++k) {  // never from an earlier step to a later
+  // never from an earlier step to a later
+  for (std::size_t k = 0; k < horizon_.steps.size(); ++k) {
     const Index index = horizon_.shifted[k];
     horizon_.nominal[k] = index < horizon_.count()
                               ? horizon_.solution[static_cast<std::size_t>(index)]

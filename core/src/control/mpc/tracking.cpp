@@ -33,8 +33,8 @@ PathPlace locate(const ReferencePath& track, Vec2 point, double low, double high
   const Index end = static_cast<Index>(last);
   if (place.index >= end - 1 && (place.index == end || place.fraction >= 1.0)) {
     const Pose& pose = poses[last];
-    const double over = (point.x - pose.x) * std::cos(pose.theta) +
-                        (point.y - pose.y) * std::sin(pose.theta);
+    const double over =
+        (point.x - pose.x) * std::cos(pose.theta) + (point.y - pose.y) * std::sin(pose.theta);
     place = {lengths[last] + std::max(over, 0.0), end, 0.0};
   }
   return place;

@@ -17,8 +17,7 @@ constexpr int kSpread = 5;  // curvatures that are spread evenly
 /// Takes the point of an arc that misses the target by least, if it is nearer than `least` [m].
 void Steering::try_arc(const Pose& start, const Pose& target, const Arc& arc, double& least,
                        SteeredArc& best) {
-  const Index steps =
-      ceil_index(std::abs(arc.length) / step_along(arc.curvature, limits_.spacing));
+  const Index steps = ceil_index(std::abs(arc.length) / step_along(arc.curvature, limits_.spacing));
   for (Index step = 1; step <= steps; ++step) {
     const double length = arc.length * static_cast<double>(step) / static_cast<double>(steps);
     const Pose pose = along_arc(start, {length, arc.curvature});
@@ -35,8 +34,7 @@ void Steering::try_arc(const Pose& start, const Pose& target, const Arc& arc, do
   }
 }
 
-SteeredArc Steering::steer(const Pose& start, const Pose& target, double sampled,
-                           double backward) {
+SteeredArc Steering::steer(const Pose& start, const Pose& target, double sampled, double backward) {
   const double bound = limits_.max_curvature;
   const double dx = target.x - start.x;
   const double dy = target.y - start.y;

@@ -22,8 +22,8 @@ CellSpan rows_of(Polygon outline) {
   return rows;
 }
 
-/// Columns of a convex outline within `margin` of a row; from infinity to minus infinity where there
-/// is none.
+/// Columns of a convex outline within `margin` of a row; from infinity to minus infinity where
+/// there is none.
 CellSpan columns_near(Polygon outline, double row, double margin) {
   CellSpan columns{kInfinity, -kInfinity};
   for (std::size_t i = 0; i < outline.size(); ++i) {
@@ -166,8 +166,7 @@ void add_floes(const PlacedFloes& floes, ArrayView<double, 2> grid) {
   } else if (exponent == 1.0) {
     add_weighted(floes, [soft](double q) { return 1.0 + soft - q; }, grid);
   } else {
-    add_weighted(
-        floes, [=](double q) { return std::pow(1.0 + soft - q, exponent); }, grid);
+    add_weighted(floes, [=](double q) { return std::pow(1.0 + soft - q, exponent); }, grid);
   }
 }
 

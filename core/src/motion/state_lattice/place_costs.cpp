@@ -31,8 +31,8 @@ void place_costs(ArrayView<const double, 2> sums, const LatticePlaces& places,
   const Index half = window.half;
   const double ahead = window.cell * std::cos(window.lean);
   const double across = window.cell * std::sin(window.lean);
-  const double scale = window.factor * static_cast<double>(window.stage) /
-                       static_cast<double>(2 * window.along + 1);
+  const double scale =
+      window.factor * static_cast<double>(window.stage) / static_cast<double>(2 * window.along + 1);
   const double stage_ahead = static_cast<double>(window.stage) * ahead;
   std::fill_n(costs.data(), costs.size(), 0.0);
   std::vector<double> values(at(width), 0.0);  // from each column of the last row, with its cover
@@ -59,8 +59,8 @@ void place_costs(ArrayView<const double, 2> sums, const LatticePlaces& places,
     drift(between(values), across);
     const Index low = std::max(row - window.along, Index{0});
     const Index high = std::min(row + window.along + 1, rows);
-    for (Index column = std::max(first - half, Index{0});
-         column < std::min(last + half + 1, width); ++column) {
+    for (Index column = std::max(first - half, Index{0}); column < std::min(last + half + 1, width);
+         ++column) {
       line[at(column)] = scale * (sums(column, high) - sums(column, low));
     }
     double total = 0.0;
@@ -72,8 +72,7 @@ void place_costs(ArrayView<const double, 2> sums, const LatticePlaces& places,
       if (column + half < width) total += line[at(column + half)];
       if (column - half - 1 >= 0 && column > first) total -= line[at(column - half - 1)];
       // sliding sums lose digits, a bound must not
-      values[at(column)] +=
-          stage_ahead + std::max(total - 1e-9 * std::abs(total) - 1e-12, 0.0);
+      values[at(column)] += stage_ahead + std::max(total - 1e-9 * std::abs(total) - 1e-12, 0.0);
     }
   }
 }

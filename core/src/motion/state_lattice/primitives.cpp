@@ -30,14 +30,14 @@ Index find_connections(double heading, double target, const ConnectionLimits& li
 
 void primitive_boxes(std::span<const double> headings, std::span<const std::array<Arc, 3>> arcs,
                      std::span<const double> lengths, std::span<OriginBox> boxes) {
-  constexpr std::size_t kPoses = 1000;   // room for what the spacing and the turns ask for
-  constexpr double kSpacing = 0.02;      // between poses, in lengths of the primitive
+  constexpr std::size_t kPoses = 1000;  // room for what the spacing and the turns ask for
+  constexpr double kSpacing = 0.02;     // between poses, in lengths of the primitive
   std::vector<Pose> poses(kPoses);
   std::vector<double> curvatures(kPoses);
   for (std::size_t p = 0; p < headings.size(); ++p) {
     OriginBox box{0.0, 0.0, 0.0, 0.0};
-    const Index count = sample_arcs({0.0, 0.0, headings[p]}, arcs[p], kSpacing * lengths[p],
-                                    {poses, curvatures});
+    const Index count =
+        sample_arcs({0.0, 0.0, headings[p]}, arcs[p], kSpacing * lengths[p], {poses, curvatures});
     for (Index i = 0; i < count; ++i) {
       const Pose& pose = poses[static_cast<std::size_t>(i)];
       box.row_min = std::min(box.row_min, pose.x);

@@ -9,7 +9,7 @@
 namespace pushplan {
 namespace {
 
-constexpr double kRounding = 1e-9;  // a cell counts whose centre is this far outside [cells]
+constexpr double kRounding = 1e-9;   // a cell counts whose centre is this far outside [cells]
 constexpr double kTurnOfPose = 0.1;  // less than the greatest turn between two poses [rad]
 
 /// Cells around the one of the start, set or not.

@@ -30,7 +30,8 @@ class RobotRollout {
   explicit RobotRollout(const RolloutProblem& problem)
       : problem_(problem), checker_(problem.footprint, problem.walls) {}
 
-  /// Drives from the first pose of a path on, which is filled in, and to the last one that is reached.
+  /// Drives from the first pose of a path on, which is filled in, and to the last one that is
+  /// reached.
   void roll(std::span<const DriveCommand> controls, DriveCommand twist, std::span<Pose> path,
             std::span<DriveCommand> twists) {
     last = 0;

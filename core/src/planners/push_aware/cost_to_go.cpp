@@ -32,8 +32,8 @@ HeadingPair headings_around(double theta, Index headings) {
   return {{first, floor_mod(first + 1, headings)}, {1.0 - part, part}};
 }
 
-/// Interpolates between cells; those without a value do not count, and it is infinite if too few have
-/// one.
+/// Interpolates between cells; those without a value do not count, and it is infinite if too few
+/// have one.
 double interpolate(ArrayView<const double, 3> values, const Cells& cells, Vec2 p,
                    const HeadingPair& heading) {
   const double u = (p.x - cells.origin.x) / cells.step - 0.5;
@@ -74,8 +74,8 @@ Index CostToGo::heading_of(double theta) const {
 }
 
 double CostToGo::length_to_go(const Pose& pose) const {
-  const double value = interpolate(values, cells, {pose.x, pose.y},
-                                   headings_around(pose.theta, headings()));
+  const double value =
+      interpolate(values, cells, {pose.x, pose.y}, headings_around(pose.theta, headings()));
   return value == kInfinity ? floor(row_of(pose.y), column_of(pose.x)) : value;
 }
 
@@ -110,7 +110,8 @@ Flood flood(ArrayView<const bool, 2> open, const Cells& cells, const GoalRegion&
   GridDijkstra search({weights.data(), open.shape()}, cells.step, starts);
   search.settle({no_goals.data(), open.shape()}, open.size());
   const auto costs = search.costs();
-  return {{costs.data(), costs.data() + costs.size()}, {search.order().begin(), search.order().end()}};
+  return {{costs.data(), costs.data() + costs.size()},
+          {search.order().begin(), search.order().end()}};
 }
 
 double sweep_cost_to_go(ArrayView<double, 3> values, const CostToGo& table,

@@ -15,7 +15,8 @@ struct FaceVelocity {
 };
 
 /// The box pushed at one point (-a, y) whose normal has an angle `tilt` in the frame of the face.
-BoxMotion push_corner(const BoxContact& contact, double y, double tilt, const FaceVelocity& bumper) {
+BoxMotion push_corner(const BoxContact& contact, double y, double tilt,
+                      const FaceVelocity& bumper) {
   const double px = -contact.depth;
   const double square = contact.spread * contact.spread;
   // velocity of the bumper at the point

@@ -6,7 +6,7 @@ namespace {
 constexpr double kSubstep = 0.2;  // greatest motion of the bumper in one substep [distance from the
                                   // axle to the box's centre]
 constexpr double kMaxSubsteps = 6.0;
-constexpr double kFlush = 1e-9;   // angle below which a box counts as lying on the bumper [rad]
+constexpr double kFlush = 1e-9;  // angle below which a box counts as lying on the bumper [rad]
 
 /// Moves the robot along an arc and leaves the box where it is on the ground.
 void drive(Pose& robot, const Twist& twist, double dt) {
@@ -46,8 +46,7 @@ Left leave(const BoxContact& contact, const PushState& state, double ahead, cons
 /// One substep of a box that touches the bumper at an angle of known cosine and sine.
 BoxMotion push(const BoxContact& contact, PushState& state, double c, double s, const Twist& twist,
                double dt) {
-  const auto [motion, x] =
-      contact_velocity(contact, state.offset, state.angle, c, s, twist, dt);
+  const auto [motion, x] = contact_velocity(contact, state.offset, state.angle, c, s, twist, dt);
   const double uy = twist.w * x;
   const double before = state.angle - contact.flush_angle(state.offset);
   state.offset += dt * (motion.normal * s + motion.sideways * c - uy);
@@ -65,7 +64,8 @@ BoxMotion push(const BoxContact& contact, PushState& state, double c, double s, 
 BoxMotion advance_box(const BoxContact& contact, PushState& state, const Twist& twist, double dt) {
   const double reach = contact.reach();
   const double travel = std::abs(twist.v) * dt + std::abs(twist.w) * dt * reach;
-  const double count = std::max(1.0, std::min(kMaxSubsteps, std::ceil(travel / (kSubstep * reach))));
+  const double count =
+      std::max(1.0, std::min(kMaxSubsteps, std::ceil(travel / (kSubstep * reach))));
   const double step = dt / count;
   BoxMotion motion;
   for (Index i = 0; i < static_cast<Index>(count); ++i) {

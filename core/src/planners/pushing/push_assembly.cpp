@@ -62,7 +62,8 @@ BoxSlopes linearise(const BoxContact& contact, double offset, double angle, cons
   return slopes;
 }
 
-PushAssembly::PushAssembly(Index steps, Index commands) : moves_(static_cast<std::size_t>(commands)) {
+PushAssembly::PushAssembly(Index steps, Index commands)
+    : moves_(static_cast<std::size_t>(commands)) {
   const auto rows = static_cast<std::size_t>(kResiduals * steps);
   const std::size_t n = 2 * moves_;
   jacobian_.resize(rows * n);
@@ -153,8 +154,7 @@ void PushAssembly::differentiate(const PushingProblem& problem, const PushState&
 
 /// Adds the cost of a step's commands to P and q. Returns what the nominal ones cost.
 double PushAssembly::add_command_costs(const PushingProblem& problem, const Step& step,
-                                       std::span<const Twist> nominal,
-                                       ArrayView<double, 2> hessian,
+                                       std::span<const Twist> nominal, ArrayView<double, 2> hessian,
                                        std::span<double> gradient) const {
   struct Kind {
     double Twist::* of;
@@ -216,8 +216,7 @@ double PushAssembly::assemble(const PushingProblem& problem, std::span<const Twi
   const double unit = weights.length / weights.max_speed;  // T [s]
   Pose box = box_pose(contact, here);
   mpc::PathPlace place = mpc::locate(track, {box.x, box.y}, problem.along, problem.along);
-  double curvature =
-      mpc::errors(track, {box.x, box.y, here.robot.theta}, place).curvature;
+  double curvature = mpc::errors(track, {box.x, box.y, here.robot.theta}, place).curvature;
   place.along = problem.along;
   for (std::size_t k = 0; k < count; ++k) {
     const double dt = problem.steps[k];
@@ -233,13 +232,13 @@ double PushAssembly::assemble(const PushingProblem& problem, std::span<const Twi
     advance(contact, here, twist, dt);
     here.gap = 0.0;
     box = box_pose(contact, here);
-    place = mpc::locate(track, {box.x, box.y}, place.along,
-                        place.along + 2.0 * twist.v * dt + 1e-9);
+    place =
+        mpc::locate(track, {box.x, box.y}, place.along, place.along + 2.0 * twist.v * dt + 1e-9);
     const mpc::PathErrors found = mpc::errors(track, box, place);
     curvature = found.curvature;
     const double factor = tau * (k == count - 1 ? weights.terminal : 1.0);
-    const auto step = residuals(weights, found, here, contact.flush_angle(here.offset), twist,
-                                factor);
+    const auto step =
+        residuals(weights, found, here, contact.flush_angle(here.offset), twist, factor);
     std::ranges::copy(step, residual_.begin() + static_cast<Index>(k) * kResiduals);
     const ArrayView<double, 2> rows = rows_of(k);
     differentiate(problem, here, found, factor, rows);
@@ -255,8 +254,8 @@ double PushAssembly::assemble(const PushingProblem& problem, std::span<const Twi
   return value;
 }
 
-/// Adds J'J to P and J'(r - J z) to q by loops over what is not zero: a threaded matrix product waits
-/// longer than it computes.
+/// Adds J'J to P and J'(r - J z) to q by loops over what is not zero: a threaded matrix product
+/// waits longer than it computes.
 void PushAssembly::square(const PushingProblem& problem, std::span<const Twist> nominal,
                           ArrayView<double, 2> hessian, std::span<double> gradient) {
   const std::size_t n = gradient.size();

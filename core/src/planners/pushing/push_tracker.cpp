@@ -12,7 +12,8 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // angle at which another face is taken to be the pushed one [rad]
 constexpr double kFaceTurned = std::numbers::pi * 50.0 / 180.0;
-constexpr double kPoseJump = 0.35;  // a pose farther than this from the predicted one replaces it [L]
+// a pose farther than this from the predicted one replaces it [L]
+constexpr double kPoseJump = 0.35;
 // greatest move of the box's place, back or ahead, from one call to the next [L]
 constexpr double kSearchBack = 0.5;
 constexpr double kSearchAhead = 2.0;
@@ -84,7 +85,9 @@ void PushTracker::correct(const PushState& seen, double time) {
     const double slip = seen.offset - guess_.offset;
     const double tilt = wrap_angle(seen.angle - guess_.angle);
     const double gap = seen.gap - guess_.gap;
-    const auto corrected = [&](double guess, double change) { return guess + tuning_.gain * change; };
+    const auto corrected = [&](double guess, double change) {
+      return guess + tuning_.gain * change;
+    };
     state_ = {{corrected(guess_.robot.x, dx), corrected(guess_.robot.y, dy),
                corrected(guess_.robot.theta, turn)},
               corrected(guess_.offset, slip),
@@ -120,13 +123,11 @@ bool PushTracker::observe(const mpc::ReferencePath& track, const Pose& robot, co
   const double size = contact().reach();
   const Pose at = box_pose(contact(), guess_);
   const double low = std::max(along_ - kSearchBack * size, 0.0);
-  const mpc::PathPlace place =
-      mpc::locate(track, {at.x, at.y}, low, along_ + kSearchAhead * size);
+  const mpc::PathPlace place = mpc::locate(track, {at.x, at.y}, low, along_ + kSearchAhead * size);
   along_ = std::min(place.along, track.length());
   const Pose& path =
       track.poses[std::min(static_cast<std::size_t>(place.index), track.poses.size() - 1)];
-  lateral_ =
-      (at.y - path.y) * std::cos(path.theta) - (at.x - path.x) * std::sin(path.theta);
+  lateral_ = (at.y - path.y) * std::cos(path.theta) - (at.x - path.x) * std::sin(path.theta);
   if (!(place.along < track.length() - 1e-9)) return false;
   const PushingProblem problem = problem_now(track, held);
   begin_commands(held);
@@ -154,7 +155,7 @@ PushingProblem PushTracker::problem_now(const mpc::ReferencePath& track, double 
   const double far = kMaxOffset * contact().half;
   near.offset = std::min(std::max(near.offset, -far), far);
   near.gap = std::min(near.gap, kMaxGap * length);
-  return {contact(), track,          weights,        near,           along_,
+  return {contact(),      track,          weights,        near,          along_,
           *horizon_.last, horizon_.units, horizon_.steps, tuning_.groups};
 }
 
@@ -169,8 +170,8 @@ void PushTracker::begin_commands(double held) {
 }
 
 void PushTracker::assemble(const mpc::ReferencePath& track, double held) {
-  value_ = assembly_.assemble(problem_now(track, held), horizon_.nominal,
-                              horizon_.program.hessian, horizon_.program.gradient);
+  value_ = assembly_.assemble(problem_now(track, held), horizon_.nominal, horizon_.program.hessian,
+                              horizon_.program.gradient);
 }
 
 /// Sets the nominal commands to the last solution, moved on by the time since.
@@ -227,8 +228,7 @@ Twist PushTracker::drive(const Obstacles& obstacles, bool solved, double time, d
 Twist PushTracker::send(const Twist& wanted, double time, double held) {
   const Twist command = horizon_.send(wanted, held, true);
   // what another command had followed in effect when the state was observed moves it no more
-  horizon_.remember(time,
-                    std::max(seen_at_ - tuning_.delay, time - 2.0 * tuning_.delay - 1.0));
+  horizon_.remember(time, std::max(seen_at_ - tuning_.delay, time - 2.0 * tuning_.delay - 1.0));
   return command;
 }
 

@@ -11,7 +11,7 @@ namespace pushplan::rearrangement {
 namespace {
 
 constexpr double kMaxStartTurn = 0.5;  // from a pose to the headings that are near it [rad]
-constexpr Index kBlock = 64;           // poses that are passed over at once where none is in an object
+constexpr Index kBlock = 64;  // poses that are passed over at once where none is in an object
 
 template <class Value>
 std::array<double, kHeadingCount> for_each_move(Value value) {

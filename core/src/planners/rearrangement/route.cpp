@@ -49,8 +49,8 @@ RouteSearch::Overlap RouteSearch::overlap(const Pose& pose) {
     }
     double deepest = 0.0;
     for (Index part = 0; part < parts.count(); ++part) {
-      deepest = std::max(
-          deepest, convex_penetration(parts[part], outlines[static_cast<Index>(k)]).depth);
+      deepest =
+          std::max(deepest, convex_penetration(parts[part], outlines[static_cast<Index>(k)]).depth);
     }
     if (deepest > 0.0) {
       all.depth += deepest;
@@ -123,7 +123,8 @@ Legs RouteSearch::cheapest_legs(std::span<const Vec2> points, double heading, do
   const Index count = static_cast<Index>(points.size());
   std::vector<double> best(at(2 * count), kInfinity);
   std::vector<double> headings(at(2 * count), heading);
-  Legs legs{{}, std::vector<Index>(at(2 * count), -1),
+  Legs legs{{},
+            std::vector<Index>(at(2 * count), -1),
             std::vector<Legs::Turns>(at(2 * count), {0.0, 0.0})};
   best[0] = 0.0;
   for (Index to = 2; to < 2 * count; ++to) {

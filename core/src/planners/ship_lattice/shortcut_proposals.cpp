@@ -17,9 +17,9 @@ Pose displace_end(const Pose& end, double aside, const ChangeDraw& draw, const C
   const Vec2 normal = problem.goal.normal;
   const double gap = (end.x - point.x) * normal.x + (end.y - point.y) * normal.y;
   const bool straight = draw.kind < 0.5 * problem.end_fraction;
-  return {end.x - gap * normal.x - aside * normal.y, end.y - gap * normal.y + aside * normal.x,
-          straight ? std::atan2(normal.y, normal.x) + 0.1 * shift.turn
-                   : end.theta + 0.2 * shift.turn};
+  return {
+      end.x - gap * normal.x - aside * normal.y, end.y - gap * normal.y + aside * normal.x,
+      straight ? std::atan2(normal.y, normal.x) + 0.1 * shift.turn : end.theta + 0.2 * shift.turn};
 }
 
 }  // namespace

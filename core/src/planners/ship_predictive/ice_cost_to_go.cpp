@@ -49,8 +49,7 @@ double sample(ArrayView<const double, 2> field, Between row, Between column) {
   const double* far = near + field.extent(1);
   const double u = row.part;
   const double v = column.part;
-  return (1.0 - u) * ((1.0 - v) * near[0] + v * near[1]) +
-         u * ((1.0 - v) * far[0] + v * far[1]);
+  return (1.0 - u) * ((1.0 - v) * near[0] + v * near[1]) + u * ((1.0 - v) * far[0] + v * far[1]);
 }
 
 /// A place among the columns of a table: its nearest one within it, and how far that is.
@@ -137,8 +136,8 @@ void IceCostToGo::fill_table() const {
       const Between bow_row = place_in_field((y + to_bow.y - low) / cell, field.extent(0));
       for (Index c = 0; c < columns; ++c) {
         const double x = left + static_cast<double>(c) * column;
-        const double ahead = sample(
-            field, bow_row, place_in_field((x + to_bow.x - left) / cell, field.extent(1)));
+        const double ahead =
+            sample(field, bow_row, place_in_field((x + to_bow.x - left) / cell, field.extent(1)));
         const TableColumn next = column_of(static_cast<double>(c) - aside, columns);
         const double outside = kOutside * mass * next.beside * column;
         double best = std::numeric_limits<double>::infinity();
@@ -170,8 +169,7 @@ double IceCostToGo::cost_to_go(const Pose& ship) const {
   const double outside = kOutside * mass * beside * column;
   const double a = look_up(table.row(i), place, heading) + outside;
   const double b = look_up(table.row(i + 1), place, heading) + outside;
-  return a + (r - static_cast<double>(i)) * (b - a) +
-         mass * (before + kOutside * steep * bow);
+  return a + (r - static_cast<double>(i)) * (b - a) + mass * (before + kOutside * steep * bow);
 }
 
 }  // namespace pushplan

@@ -57,7 +57,7 @@ struct Horizon {
   std::span<Twist> solution;       // (M,)
   std::span<Twist> nominal;        // (M,) what the next program is about
   Twist* last;                     // the command before the first
-  std::span<SentCommand> sent;     // commands under way; of more than these the oldest count no more
+  std::span<SentCommand> sent;  // commands under way; of more than these the oldest count no more
   HorizonCounts* counts;
 
   Index count() const { return static_cast<Index>(steps.size()); }

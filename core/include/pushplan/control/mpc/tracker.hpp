@@ -1,10 +1,11 @@
 // The predictive tracker: from a pose to a command.
 //
-// The robot's motion under a constant twist is an exact arc, so the prediction has no discretisation
-// error. Offset and heading error are linearised about a nominal motion (the last solution, moved on
-// in time), which is a Gauss-Newton step of the nonlinear problem: the real-time iteration of Diehl,
-// Bock and Schloeder (SIAM J. Control Optim. 43(5), 2005). The states are eliminated, which leaves a
-// problem in the inputs alone whose constraints never change and can always be met.
+// The robot's motion under a constant twist is an exact arc, so the prediction has no
+// discretisation error. Offset and heading error are linearised about a nominal motion (the last
+// solution, moved on in time), which is a Gauss-Newton step of the nonlinear problem: the real-time
+// iteration of Diehl, Bock and Schloeder (SIAM J. Control Optim. 43(5), 2005). The states are
+// eliminated, which leaves a problem in the inputs alone whose constraints never change and can
+// always be met.
 #pragma once
 
 #include <optional>
@@ -38,9 +39,9 @@ class TrackingAssembly {
 
   /// Fills P and q. Nominal commands of NaN are filled with what the path asks for.
   void assemble(const ReferencePath& track, const Tuning& tuning,
-                const Pose& pose,      // where the robot is when the first command takes effect
-                double along,          // path length of its place on the path [m]
-                const Twist& before,   // the command before the first
+                const Pose& pose,     // where the robot is when the first command takes effect
+                double along,         // path length of its place on the path [m]
+                const Twist& before,  // the command before the first
                 std::span<const double> steps,  // (N,) how long each command is held [s]
                 std::span<Twist> nominal,       // (N,) to linearise about
                 ArrayView<double, 2> hessian, std::span<double> gradient);
@@ -55,13 +56,13 @@ class TrackingAssembly {
   void carry_over(std::size_t k, const ArcMotion& motion, double dt, std::size_t count,
                   const Tuning& tuning);
 
-  std::vector<StateSlope> jacobian_;     // (n,) d(x, y, theta)/dz
-  std::vector<double> offset_slopes_;    // (n,) d offset/dz
-  std::vector<double> heading_slopes_;   // (n,) d heading error/dz
+  std::vector<StateSlope> jacobian_;    // (n,) d(x, y, theta)/dz
+  std::vector<double> offset_slopes_;   // (n,) d offset/dz
+  std::vector<double> heading_slopes_;  // (n,) d heading error/dz
 };
 
-/// A tracker of one robot with its state. A caller makes each step: `begin_step` puts up the program,
-/// a solver solves it, `finish_step` gives the command.
+/// A tracker of one robot with its state. A caller makes each step: `begin_step` puts up the
+/// program, a solver solves it, `finish_step` gives the command.
 class Tracker {
  public:
   Tracker(const Horizon& horizon, const Tuning& tuning,

@@ -21,9 +21,9 @@ struct CellSpan {
 CellSpan row_span(Polygon outline, double row);
 
 /// Costs of covering K floes. The cost of a floe is spread over its cells in proportion to
-/// (1 + soft - q^2)^exponent, where q is the distance from its centre over the radius of the disc of
-/// the same area, at most 1. An exponent of -1/2 makes every strip of a disc, of whatever direction,
-/// cost the same; 1 weighs the middle most.
+/// (1 + soft - q^2)^exponent, where q is the distance from its centre over the radius of the disc
+/// of the same area, at most 1. An exponent of -1/2 makes every strip of a disc, of whatever
+/// direction, cost the same; 1 weighs the middle most.
 struct FloeCosts {
   std::span<const double> totals;  // (K,) of covering the whole floe, in metres of travel
   double exponent;

@@ -1,10 +1,11 @@
 // The cost of what is covered from each place of a lattice to a goal line.
 //
 // A path crosses every row of cells up to the line, and where its origin does so, the robot covers
-// at least a window as wide as its inscribed disc. So the cost is at least that of the best sequence
-// of such windows, one in each row, plus the length of the path that joins them. Of that length only
-// a cos(lean) + b sin(lean) counts, for a metres ahead and b across, which is never more than it:
-// rounding the crossings to cells lengthens b no further if they may be off by one cell.
+// at least a window as wide as its inscribed disc. So the cost is at least that of the best
+// sequence of such windows, one in each row, plus the length of the path that joins them. Of that
+// length only a cos(lean) + b sin(lean) counts, for a metres ahead and b across, which is never
+// more than it: rounding the crossings to cells lengthens b no further if they may be off by one
+// cell.
 //
 // That bound dodges floes as no hull can. Averaging the costs along the path over the length of the
 // hull takes this out: an estimate that is no bound, but guides a search much better.

@@ -67,14 +67,14 @@ struct LatticeGoal {
 };
 
 /// A lattice of H headings over rows ahead and columns across it, for `AStar`. Node (h, u, v) has
-/// the number (h * rows + u) * columns + v. Lengths are in metres and places in steps, unless stated
-/// otherwise; costs are in metres of travel.
+/// the number (h * rows + u) * columns + v. Lengths are in metres and places in steps, unless
+/// stated otherwise; costs are in metres of travel.
 struct PoseLattice {
   Index rows;
   Index columns;
-  double step;         // distance of neighbouring places [m]
-  Index cells;         // cells of the map in a step
-  Index corner_row;    // cell of the map on which the node of row 0 and column 0 lies
+  double step;       // distance of neighbouring places [m]
+  Index cells;       // cells of the map in a step
+  Index corner_row;  // cell of the map on which the node of row 0 and column 0 lies
   Index corner_column;
   std::span<const Index> first;        // (H + 1,) where the primitives of each heading start
   std::span<const PrimitiveEnd> ends;  // (P,)
@@ -91,8 +91,8 @@ struct PoseLattice {
   LatticeGoal goal;
   ArrayView<const double, 2> row_bounds;   // (H, rows) length of the path from each row and heading
                                            // to the line [m]
-  ArrayView<const double, 2> place_costs;  // (rows, columns) bound or estimate of the cost from each
-                                           // place to the line [m]
+  ArrayView<const double, 2> place_costs;  // (rows, columns) bound or estimate of the cost from
+                                           // each place to the line [m]
   double inflation;                        // factor on both
 
   struct Place {

@@ -28,8 +28,8 @@ struct ConnectionLimits {
   double slack;   // greatest turn of a path beyond the change of heading [rad]
 };
 
-/// Finds the Dubins paths without needless turns from the origin to all points at a heading `target`
-/// that lie ahead. Returns their number; those are left out for which `out` has no room.
+/// Finds the Dubins paths without needless turns from the origin to all points at a heading
+/// `target` that lie ahead. Returns their number; those are left out for which `out` has no room.
 Index find_connections(double heading, double target, const ConnectionLimits& limits,
                        std::span<Connection> out);
 

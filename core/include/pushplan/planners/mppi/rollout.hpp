@@ -46,16 +46,17 @@ enum class RolloutOutcome : Index { kDriven, kReached, kBlocked };
 
 /// S rollouts of N + 1 poses among K objects, in memory of somebody else.
 struct Rollouts {
-  ArrayView<Pose, 2> paths;           // (S, N + 1) poses of the robot up to the end
-  ArrayView<DriveCommand, 2> twists;  // (S, H) speed [m/s] and turn rate [rad/s] of each step
-  std::span<Index> ends;              // (S,) index of the last pose that is reached
+  ArrayView<Pose, 2> paths;            // (S, N + 1) poses of the robot up to the end
+  ArrayView<DriveCommand, 2> twists;   // (S, H) speed [m/s] and turn rate [rad/s] of each step
+  std::span<Index> ends;               // (S,) index of the last pose that is reached
   std::span<RolloutOutcome> outcomes;  // (S,)
-  ArrayView<Pose, 2> objects;         // (S, K) poses of the objects there
-  std::span<double> works;            // (S,) sum of mass times path length of the objects [kg m]
+  ArrayView<Pose, 2> objects;          // (S, K) poses of the objects there
+  std::span<double> works;             // (S,) sum of mass times path length of the objects [kg m]
 };
 
-/// Drives the robot by S control sequences, (S, H) as fractions of the greatest speed and turn rate,
-/// until it is blocked or in the goal. `before` are its speed [m/s] and turn rate [rad/s] before.
+/// Drives the robot by S control sequences, (S, H) as fractions of the greatest speed and turn
+/// rate, until it is blocked or in the goal. `before` are its speed [m/s] and turn rate [rad/s]
+/// before.
 void roll_robots(ArrayView<const DriveCommand, 2> controls, const Pose& start,
                  const DriveCommand& before, const RolloutProblem& problem, const Rollouts& out);
 

@@ -1,13 +1,13 @@
 // Best-first search over driven arcs whose nodes carry the objects that they have pushed.
 //
-// A hybrid-state A* (Dolgov, Thrun, Montemerlo and Diebel, "Path Planning for Autonomous Vehicles in
-// Unknown Semi-structured Environments", 2010) whose nodes hold, besides the pose, where the objects
-// are by then, as in PAMO* (Ren et al., arXiv 2410.18333). An edge costs m0 times its length plus w
-// times the interaction work of driving it, which the interaction model tells. An edge that moves
-// nothing shares the objects of its parent, so that objects at rest cost neither time nor memory.
-// Edges are driven only when they come first in the queue (Cohen, Phillips and Likhachev, "Planning
-// Single-arm Manipulations with N-arm Robots", 2014: lazy weighted A*); until then they count as if
-// they pushed nothing.
+// A hybrid-state A* (Dolgov, Thrun, Montemerlo and Diebel, "Path Planning for Autonomous Vehicles
+// in Unknown Semi-structured Environments", 2010) whose nodes hold, besides the pose, where the
+// objects are by then, as in PAMO* (Ren et al., arXiv 2410.18333). An edge costs m0 times its
+// length plus w times the interaction work of driving it, which the interaction model tells. An
+// edge that moves nothing shares the objects of its parent, so that objects at rest cost neither
+// time nor memory. Edges are driven only when they come first in the queue (Cohen, Phillips and
+// Likhachev, "Planning Single-arm Manipulations with N-arm Robots", 2014: lazy weighted A*); until
+// then they count as if they pushed nothing.
 #pragma once
 
 #include <algorithm>
@@ -28,12 +28,12 @@ struct Branching {
   double length;                       // of an edge [m]
   double inflation;                    // of the heuristic, in the order of the queue
   double pruning_factor;  // on the length that is left, where a node is given up for its cost
-  std::span<const double> masses;      // (K,) of the objects as the search weighs them [kg]
+  std::span<const double> masses;  // (K,) of the objects as the search weighs them [kg]
 };
 
-/// Poses and pushed objects, as a lattice for `AStar` whose nodes are made as it goes. Node k of the
-/// tree has two numbers there: 2 k is its arc as guessed, whose only successor is 2 k + 1, the arc as
-/// driven; from that the next arcs branch. The root is 1.
+/// Poses and pushed objects, as a lattice for `AStar` whose nodes are made as it goes. Node k of
+/// the tree has two numbers there: 2 k is its arc as guessed, whose only successor is 2 k + 1, the
+/// arc as driven; from that the next arcs branch. The root is 1.
 template <InteractionModel M>
 class PushLattice {
  public:
@@ -113,8 +113,7 @@ bool PushLattice<M>::settle(PushTree::Node& node, double length) {
   const auto moved = rollout_.moved();
   double work = 0.0;
   for (std::size_t k = 0; k < moved.size(); ++k) work += moved[k] * branching_.masses[k];
-  const double cost =
-      parent.cost + problem().robot_mass * length + problem().push_weight * work;
+  const double cost = parent.cost + problem().robot_mass * length + problem().push_weight * work;
   const bool goal = in_goal(node.pose);
   if (!goal) {
     const auto objects = work > 0.0 ? rollout_.objects() : tree.objects(parent.row);

@@ -4,8 +4,8 @@
 // semi-Lagrangian Gauss-Seidel sweeps: from each cell centre short arcs are driven, and the value
 // where they end is interpolated (Falcone and Ferretti, "Semi-Lagrangian Approximation Schemes for
 // Linear and Hamilton-Jacobi Equations", 2013; for cars: Takei, Tsai, Shen and Landa, "A practical
-// path-planning algorithm for a simple car", 2010). Objects are not in it, so one table serves every
-// call on a map.
+// path-planning algorithm for a simple car", 2010). Objects are not in it, so one table serves
+// every call on a map.
 #pragma once
 
 #include <algorithm>
@@ -23,8 +23,8 @@ namespace pushplan {
 struct CostToGo {
   ArrayView<const double, 3> values;  // (rows, columns, headings) [m]; infinite where the robot
                                       // overlaps a wall or has no way
-  ArrayView<const double, 2> floor;   // (rows, columns) least length for the robot's inscribed disc,
-                                      // on the grid [m]
+  ArrayView<const double, 2> floor;  // (rows, columns) least length for the robot's inscribed disc,
+                                     // on the grid [m]
   Cells cells;
 
   Index rows() const { return values.extent(0); }
@@ -69,8 +69,8 @@ struct ArcEnds {
   double length;                  // of the arcs [m]
 };
 
-/// One Gauss-Seidel sweep over the cells in some order, by their distances from the goal. `values` are
-/// those of the table. Returns the greatest change [m].
+/// One Gauss-Seidel sweep over the cells in some order, by their distances from the goal. `values`
+/// are those of the table. Returns the greatest change [m].
 double sweep_cost_to_go(ArrayView<double, 3> values, const CostToGo& table,
                         ArrayView<const bool, 3> free, std::span<const Index> order,
                         const ArcEnds& arcs);

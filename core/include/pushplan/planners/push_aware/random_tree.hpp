@@ -4,9 +4,10 @@
 // state-cost space", arXiv 1505.04098; Kleinbort, Granados, Solovey, Bonalli, Bekris and Halperin,
 // "Refined analysis of asymptotically-optimal kinodynamic planning in the state-cost space", 2020):
 // targets are drawn uniformly from poses and costs, the node that is nearest in both is driven on
-// with a random curvature over a random length, and what cannot become cheaper than the best plan is
-// thrown away. Nothing in it depends on a table, a lattice or a coarse path. The best-first search is
-// far quicker to good plans; this is what finds, in the end, any plan that it cannot represent.
+// with a random curvature over a random length, and what cannot become cheaper than the best plan
+// is thrown away. Nothing in it depends on a table, a lattice or a coarse path. The best-first
+// search is far quicker to good plans; this is what finds, in the end, any plan that it cannot
+// represent.
 #pragma once
 
 #include <span>
@@ -49,8 +50,8 @@ struct Growth {
   Index node;  // in the goal, if one was found
 };
 
-/// Adds a random arc for each draw, until one leads to the goal. `bound` is the cost that a plan has
-/// to undercut [kg m], `longest` the longest arc [m].
+/// Adds a random arc for each draw, until one leads to the goal. `bound` is the cost that a plan
+/// has to undercut [kg m], `longest` the longest arc [m].
 template <InteractionModel M>
 Growth grow(PushTree& tree, std::span<const GrowthDraw> draws, double bound, double longest,
             const GrowthScales& scales, const PathProblem& problem, M& model) {
@@ -58,10 +59,10 @@ Growth grow(PushTree& tree, std::span<const GrowthDraw> draws, double bound, dou
   const Box& box = problem.walls.bounds;
   for (const GrowthDraw& draw : draws) {
     if (!tree.has_room(1) || !tree.has_room_for_objects()) return {Growth::Status::kFull, -1};
-    const GrowthTarget target{{box.x_min + draw.x * (box.x_max - box.x_min),
-                               box.y_min + draw.y * (box.y_max - box.y_min),
-                               2.0 * std::numbers::pi * draw.heading},
-                              bound * draw.cost};
+    const GrowthTarget target{
+        {box.x_min + draw.x * (box.x_max - box.x_min), box.y_min + draw.y * (box.y_max - box.y_min),
+         2.0 * std::numbers::pi * draw.heading},
+        bound * draw.cost};
     PushTree::Node& node = tree.spare();
     node.parent = nearest_node(tree, target, scales, bound);
     const PushTree::Node& parent = tree[node.parent];

@@ -3,9 +3,10 @@
 // All velocities are in the frame of the pushed face: n forward, into the box, t to the left. The
 // ellipsoidal limit surface makes the box's velocity (v_n, v_t, omega) parallel to
 // (f_n, f_t, tau / c^2) (Goyal, Ruina and Papadopoulos, Wear 143, 1991; Howe and Cutkosky, IJRR
-// 15(6), 1996). A pressed line of contact is a force at its centre of pressure y within the line, so
-// tau = -a f_t - y f_n (Lynch and Mason, IJRR 15(6), 1996). What would close or hold the line of
-// contact within a step happens if friction and pressure allow it, else the nearest that they allow.
+// 15(6), 1996). A pressed line of contact is a force at its centre of pressure y within the line,
+// so tau = -a f_t - y f_n (Lynch and Mason, IJRR 15(6), 1996). What would close or hold the line of
+// contact within a step happens if friction and pressure allow it, else the nearest that they
+// allow.
 #pragma once
 
 #include <algorithm>
@@ -72,7 +73,7 @@ struct BoxMotion {
   double turn = 0.0;      // omega [rad/s]
   double pressure = 0.0;  // centre of pressure, along t [m]
   ContactMode mode = ContactMode::kFree;
-  double shear = 0.0;     // over the normal force
+  double shear = 0.0;  // over the normal force
 };
 
 /// The motion of a box that touches the bumper, and the x of its centre [m].

@@ -1,8 +1,8 @@
 // The pushing problem: from a path and nominal commands to P and q.
 //
 // A Gauss-Newton step of the nonlinear problem about the last solution: the real-time iteration of
-// Diehl, Bock and Schloeder (SIAM J. Control Optim. 43(5), 2005), as Hogan and Rodriguez (WAFR 2016)
-// and Tang et al. (arXiv 2309.14295) use model-predictive control for pushing. States are
+// Diehl, Bock and Schloeder (SIAM J. Control Optim. 43(5), 2005), as Hogan and Rodriguez (WAFR
+// 2016) and Tang et al. (arXiv 2309.14295) use model-predictive control for pushing. States are
 // eliminated, which leaves a problem in the commands alone whose constraints can always be met.
 #pragma once
 
@@ -93,14 +93,14 @@ class PushAssembly {
   void square(const PushingProblem& problem, std::span<const Twist> nominal,
               ArrayView<double, 2> hessian, std::span<double> gradient);
 
-  std::size_t moves_;  // M
-  std::vector<double> jacobian_;  // (6 N, 2 M)
-  std::vector<double> residual_;  // (6 N,)
+  std::size_t moves_;               // M
+  std::vector<double> jacobian_;    // (6 N, 2 M)
+  std::vector<double> residual_;    // (6 N,)
   std::vector<StateSlope> slopes_;  // (2 M,)
-  std::vector<double> product_;   // (2 M, 2 M)
-  std::vector<double> pull_;      // (2 M,)
-  std::vector<double> z_;         // (2 M,)
-  std::vector<double> row_;       // (2 M,)
+  std::vector<double> product_;     // (2 M, 2 M)
+  std::vector<double> pull_;        // (2 M,)
+  std::vector<double> z_;           // (2 M,)
+  std::vector<double> row_;         // (2 M,)
 };
 
 }  // namespace pushplan::pushing

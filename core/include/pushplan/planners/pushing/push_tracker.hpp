@@ -12,7 +12,7 @@ namespace pushplan::pushing {
 
 /// How well a push along a direction meets a face.
 struct FaceScore {
-  double x;     // cosine and sine of the face's inward normal in the box's frame, scaled
+  double x;  // cosine and sine of the face's inward normal in the box's frame, scaled
   double y;
   double bias;
 };
@@ -30,7 +30,7 @@ struct PushTuning {
   std::span<const Index> groups;  // (N,) which of the M commands holds in each step
   double reach;                   // of the steps at full speed [L]
   double delay;                   // between a command and its effect [s]
-  double gain;  // fraction by which an observation corrects what was predicted
+  double gain;                    // fraction by which an observation corrects what was predicted
 };
 
 /// Pushes one box along one path. A caller makes each step: `observe` puts up the program, a solver

@@ -20,8 +20,8 @@ struct GoalEdge {
 struct ObjectGoal {
   Polygon polygon;                  // the area that objects have to leave, or get into [m]
   std::span<const GoalEdge> edges;  // within which a delivered object lies
-  bool is_receptacle;  // objects have to get into the polygon, and are removed there
-  double slack;        // by how much an object has to be clear of the polygon's edge [m]
+  bool is_receptacle;               // objects have to get into the polygon, and are removed there
+  double slack;  // by how much an object has to be clear of the polygon's edge [m]
 };
 
 /// The test of objects against their goal, with memory for one thread. The outlines and the goal

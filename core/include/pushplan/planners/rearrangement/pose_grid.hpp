@@ -1,7 +1,7 @@
 // A lattice of poses over a static map, and which of them and of the moves between are free.
 //
-// Sixteen headings whose straight moves lead from cell to cell; the robot drives ahead or back along
-// its heading, or turns to the next heading on the spot.
+// Sixteen headings whose straight moves lead from cell to cell; the robot drives ahead or back
+// along its heading, or turns to the next heading on the spot.
 #pragma once
 
 #include <array>
@@ -42,8 +42,8 @@ extern const std::array<double, kHeadingCount> kTurns;     // from each to the n
 /// Cell (i, j) of the lattice has its middle at `origin + (j, i) * step`. Poses are counted heading
 /// by heading, in each row by row.
 struct PoseGrid {
-  Vec2 origin;  // [m]
-  double step;  // [m]
+  Vec2 origin;                       // [m]
+  double step;                       // [m]
   ArrayView<const bool, 3> blocked;  // (16, rows, columns) where something static is in the way
   ArrayView<const bool, 4> blocked_moves;  // (2, 16, rows, columns) from where it is in the way of
                                            // the move ahead, and of the turn to the next heading
@@ -76,8 +76,8 @@ void contact_depths(const PoseGrid& grid, const Footprint& footprint, std::span<
                     std::span<const double> radii,  // circumscribed [m]
                     ArrayView<float, 4> depths);
 
-/// Adds up, for each pose, its depth in all objects of weight [m], and the weights of those it is in.
-/// `depth` and `touch`, (16, rows, columns), are 0 before.
+/// Adds up, for each pose, its depth in all objects of weight [m], and the weights of those it is
+/// in. `depth` and `touch`, (16, rows, columns), are 0 before.
 void add_layers(ArrayView<const float, 4> layers, std::span<const double> weights,
                 ArrayView<double, 3> depth, ArrayView<double, 3> touch);
 

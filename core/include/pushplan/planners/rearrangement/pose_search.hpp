@@ -18,7 +18,7 @@ struct PoseSearchProblem {
   ArrayView<const double, 3> depths;  // (16, rows, columns) depth in the objects [m]
   ArrayView<const double, 3> touch;   // (16, rows, columns) weights of the objects
   double turn_cost;                   // of a turn [m/rad]
-  double arm;  // distance by which a turn carries an object along [m/rad]
+  double arm;                         // distance by which a turn carries an object along [m/rad]
 };
 
 /// Poses from which paths begin, and what it costs to be there [m].
@@ -32,8 +32,8 @@ struct PoseStarts {
 /// bucket waits for another round.
 class PoseSearch {
  public:
-  /// Memory for one search. `costs` and `before`, an element for each pose, receive the cost of each
-  /// pose [m] and the pose before it.
+  /// Memory for one search. `costs` and `before`, an element for each pose, receive the cost of
+  /// each pose [m] and the pose before it.
   PoseSearch(const PoseSearchProblem& problem, std::span<double> costs, std::span<Index> before);
 
   /// Searches until all targets are reached, or to the end if there are none.

@@ -34,10 +34,10 @@ struct RolloutLog {
 
 /// A push to roll out.
 struct PushAttempt {
-  Index target;                // object that follows the path, -1 for a line push
-  std::span<const Vec2> path;  // of the target object [m]
-  double shift;                // see `steer_push`
-  double limit;                // greatest length of the robot's path [m]
+  Index target;                  // object that follows the path, -1 for a line push
+  std::span<const Vec2> path;    // of the target object [m]
+  double shift;                  // see `steer_push`
+  double limit;                  // greatest length of the robot's path [m]
   std::span<const bool> wanted;  // (K,) objects that are to be done; the push ends when all are
 };
 
@@ -46,7 +46,8 @@ struct RolloutSize {
   Index poses;  // of the robot
 };
 
-/// Rollouts with memory for one thread. The bodies' arrays and those of the goal have to outlive it.
+/// Rollouts with memory for one thread. The bodies' arrays and those of the goal have to outlive
+/// it.
 class PushRollout {
  public:
   PushRollout(const Bodies& bodies, const QuasiStaticSettings& settings, const ObjectGoal& goal);

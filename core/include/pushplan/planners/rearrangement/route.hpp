@@ -24,8 +24,8 @@ struct RouteObjects {
   std::span<const double> weights;  // cost of carrying each along
 };
 
-/// The cheapest legs between points on a line. Row 2 i is point i reached driving ahead, row 2 i + 1
-/// driving back.
+/// The cheapest legs between points on a line. Row 2 i is point i reached driving ahead, row 2 i +
+/// 1 driving back.
 struct Legs {
   struct Turns {
     double first;  // how the turn before the leg is made: 1 left, -1 right, 0 the shorter way

@@ -1,6 +1,7 @@
 // Random changes of a path that keep it drivable: Dubins curves through displaced poses.
 //
-// Shortcutting after Geraerts and Overmars, "Creating high-quality paths for motion planning" (2007).
+// Shortcutting after Geraerts and Overmars, "Creating high-quality paths for motion planning"
+// (2007).
 #pragma once
 
 #include "pushplan/motion/shortcut.hpp"

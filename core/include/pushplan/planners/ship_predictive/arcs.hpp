@@ -19,14 +19,15 @@ struct ShipChannel {
   Box box;      // [m]
 };
 
-/// Drives on in small arcs of least cost to go. Returns the number of poses, 0 where they do not fit.
+/// Drives on in small arcs of least cost to go. Returns the number of poses, 0 where they do not
+/// fit.
 Index steer_on(const IceCostToGo& costs, const Pose& start,
                std::span<const double> curvatures,  // to choose from [1/m]
                double step,                         // length of the arcs [m]
                std::span<ArcPose> out);
 
-/// Lays an arc from a pose on, cut off at the goal. `out` has room for all of it, the pose included.
-/// Returns the number of poses, 0 where it leaves the channel.
+/// Lays an arc from a pose on, cut off at the goal. `out` has room for all of it, the pose
+/// included. Returns the number of poses, 0 where it leaves the channel.
 Index arc_ahead(const ShipChannel& channel, const Pose& start, double curvature,
                 double step,  // distance between poses along the arc [m]
                 std::span<ArcPose> out);

@@ -30,15 +30,15 @@ struct FloeMasses {
 struct IceCostToGo {
   ArrayView<double, 3> table;  // (rows, columns, headings) cost to the goal line [kg m]
   ArrayView<double, 2> field;  // mass ahead of the bow [kg], on smaller cells
-  double left;    // x of the first column of both [m]
-  double low;     // y of the first row of both [m]
-  double column;  // distance between the columns of the table [m]
-  double row;     // distance between the rows of the table [m]
-  double cell;    // distance between the rows and the columns of the field [m]
-  double bow;     // distance ahead of the ship's origin at which its bow meets ice [m]
-  double mass;    // of the ship [kg]
-  double weight;  // w, cost of work against travel
-  double radius;  // least turning radius [m]
+  double left;                 // x of the first column of both [m]
+  double low;                  // y of the first row of both [m]
+  double column;               // distance between the columns of the table [m]
+  double row;                  // distance between the rows of the table [m]
+  double cell;                 // distance between the rows and the columns of the field [m]
+  double bow;                  // distance ahead of the ship's origin at which its bow meets ice [m]
+  double mass;                 // of the ship [kg]
+  double weight;               // w, cost of work against travel
+  double radius;               // least turning radius [m]
 
   /// Fills the field, the mass ahead of a bow at each place.
   void fill_field(const FloeMasses& floes) const;
