@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from pushplan.core import geometry as core
 from pushplan.errors import short
-from pushplan.geometry.polygon import corners
 from pushplan.world import InvalidInputError
 from pushplan.world.checks import FloatArray, expect
 
@@ -34,7 +33,15 @@ def fill_convex(image: NDArray[Any], vertices_px: FloatArray, value: Any) -> Non
         raise InvalidInputError(
             f"value must fit into a pixel of {given.dtype.name}, got {short(value)}"
         ) from error
+    try:
+        corners = np.ascontiguousarray(vertices_px, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InvalidInputError(
+            f"vertices_px must be numbers of shape (N, 2), got {short(vertices_px)}"
+        ) from error
+    if corners.ndim != 2 or corners.shape[1] != 2:
+        raise InvalidInputError(f"vertices_px must have shape (N, 2), got {corners.shape}")
     pixels = np.ascontiguousarray(given)
-    core.fill_convex(pixels, corners("vertices_px", vertices_px), pixel)
+    core.fill_convex(pixels, corners, pixel)
     if pixels is not image:
         image[...] = pixels
