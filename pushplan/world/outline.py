@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -181,7 +182,7 @@ def grown_outlines(
     return np.stack([first, second], axis=1)[keep], grown_offsets
 
 
-def listed(name: str, outlines: Sequence[ArrayLike]) -> Sequence[ArrayLike]:
+def listed(name: str, outlines: Sequence[Any]) -> Sequence[Any]:
     """Check that outlines come in a list, a tuple or an array; they themselves are not looked at.
 
     Raises:
