@@ -96,7 +96,8 @@ class BeamSearch(Generic[Ice]):
         view = self.view
         count = max(1, round(self.config.arc / SPACING))
         step = SPACING * view.length
-        arc = core.arc_ahead(*view.channel, pose, curvature, step, count)
+        arc = np.empty((count + 1, 4))
+        arc = arc[: core.arc_ahead(*view.channel, pose, curvature, step, arc)]
         return arc[:0] if view.askew and not view.inside(arc) else arc
 
     def _cost(self, length: float, work: float, arc: FloatArray, done: float | None) -> float:
