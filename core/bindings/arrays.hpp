@@ -1,12 +1,16 @@
 // NumPy arrays seen as views. Arrays are never copied or converted: what has another type, another
-// number of dimensions or another layout is a TypeError.
+// number of dimensions or another layout is a TypeError. The core trusts lengths and indices, so a
+// binding that gets several arrays checks them against each other (`require_...`).
 #pragma once
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 
 #include <array>
+#include <cmath>
 #include <span>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "pushplan/array.hpp"
@@ -28,6 +32,68 @@ using FloatsOut = Array<double, Rank>;
 template <std::size_t Rank>
 using IntegersOut = Array<Index, Rank>;
 
+/// An argument that breaks a rule: an `InvalidInputError` of Python, which is a ValueError.
+class Refusal : public std::invalid_argument {
+  using std::invalid_argument::invalid_argument;
+};
+
+/// Refuses an argument.
+[[noreturn]] inline void refuse(const char* name, const std::string& value,
+                                const std::string& rule) {
+  throw Refusal(std::string(name) + " must be " + rule + ", got " + value);
+}
+
+/// Requires an array to have exactly so many elements, rows or columns.
+inline void require_count(const char* name, std::size_t count, std::size_t wanted) {
+  if (count != wanted) refuse(name, std::to_string(count), std::to_string(wanted) + " in number");
+}
+inline void require_count(const char* name, std::size_t count, Index wanted) {
+  require_count(name, count, static_cast<std::size_t>(wanted));
+}
+
+/// Requires an array to have room for so many.
+inline void require_room(const char* name, std::size_t count, std::size_t least) {
+  if (count < least) {
+    refuse(name, std::to_string(count), "at least " + std::to_string(least) + " in number");
+  }
+}
+
+/// Requires a whole number from `first` to `last`.
+inline void require_between(const char* name, Index value, Index first, Index last) {
+  if (value < first || value > last) {
+    refuse(name, std::to_string(value),
+           "from " + std::to_string(first) + " to " + std::to_string(last));
+  }
+}
+
+/// Requires the number of one of `count` things.
+inline void require_index(const char* name, Index value, Index count) {
+  if (value < 0 || value >= count) {
+    refuse(name, std::to_string(value), "at least 0 and less than " + std::to_string(count));
+  }
+}
+inline void require_indices(const char* name, std::span<const Index> values, Index count) {
+  for (const Index value : values) require_index(name, value, count);
+}
+
+/// Requires a number that is finite, or also at least 0.
+inline void require_finite(const char* name, double value) {
+  if (!std::isfinite(value)) refuse(name, std::to_string(value), "finite");
+}
+inline void require_not_negative(const char* name, double value) {
+  if (!(value >= 0.0)) refuse(name, std::to_string(value), "0 or more");
+}
+
+/// Requires offsets into `count` things: one more than there are parts, which never go back.
+inline void require_offsets(const char* name, std::span<const Index> offsets, std::size_t count,
+                            Index least = 0) {
+  require_room(name, offsets.size(), 1);
+  require_between(name, offsets[0], 0, static_cast<Index>(count));
+  for (std::size_t i = 1; i < offsets.size(); ++i) {
+    require_between(name, offsets[i], offsets[i - 1] + least, static_cast<Index>(count));
+  }
+}
+
 template <class T, nb::ssize_t... Extents>
 auto view(const nb::ndarray<T, nb::shape<Extents...>, nb::c_contig, nb::device::cpu>& array) {
   constexpr std::size_t Rank = sizeof...(Extents);
@@ -35,9 +101,8 @@ auto view(const nb::ndarray<T, nb::shape<Extents...>, nb::c_contig, nb::device::
     return std::span<T>(array.data(), array.shape(0));
   } else {
     typename ArrayView<T, Rank>::Shape shape;
-    for (std::size_t axis = 0; axis < Rank; ++axis) {
+    for (std::size_t axis = 0; axis < Rank; ++axis)
       shape[axis] = static_cast<Index>(array.shape(axis));
-    }
     return ArrayView<T, Rank>(array.data(), shape);
   }
 }
@@ -50,7 +115,14 @@ auto view(const nb::ndarray<nb::numpy, T, nb::shape<Extents...>, nb::c_contig>& 
 using Poses = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using PosesOut = nb::ndarray<double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using Points = nb::ndarray<const double, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>;
-using OnePose = nb::ndarray<const double, nb::shape<3>, nb::c_contig, nb::device::cpu>;
+using PointsOut = nb::ndarray<double, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>;
+/// So many numbers.
+template <nb::ssize_t Count>
+using Numbers = nb::ndarray<const double, nb::shape<Count>, nb::c_contig, nb::device::cpu>;
+template <nb::ssize_t Count>
+using NumbersOut = nb::ndarray<double, nb::shape<Count>, nb::c_contig, nb::device::cpu>;
+using OnePose = Numbers<3>;
+using OnePoseOut = NumbersOut<3>;
 
 /// Rows of x, y, theta as poses, and of x, y as points: the same numbers in memory.
 inline std::span<const Pose> poses(const Poses& array) {
@@ -61,6 +133,17 @@ inline std::span<Pose> poses(const PosesOut& array) {
 }
 inline std::span<const Vec2> points(const Points& array) {
   return {reinterpret_cast<const Vec2*>(array.data()), array.shape(0)};
+}
+/// Points to write to, at least so many.
+inline Vec2* points_out(const PointsOut& array, std::size_t least) {
+  require_room("out", array.shape(0), least);
+  return reinterpret_cast<Vec2*>(array.data());
+}
+/// Polygons of at least one corner each.
+inline Polygons polygons(const Points& vertices, const Integers<1>& offsets) {
+  const Polygons made{points(vertices), {offsets.data(), offsets.shape(0)}};
+  require_offsets("offsets", made.offsets, made.vertices.size(), 1);
+  return made;
 }
 inline Pose pose(const OnePose& array) {
   return {array.data()[0], array.data()[1], array.data()[2]};
@@ -93,10 +176,27 @@ inline constexpr auto kOwned = nb::rv_policy::move;
 
 using ReleaseGil = nb::call_guard<nb::gil_scoped_release>;
 
+/// Requires the last dimensions of an array, from `axis` on, to make up structures.
+template <class T, class Array>
+void require_structures(const Array& array, std::size_t axis) {
+  std::size_t bytes = array.itemsize();
+  for (; axis < array.ndim(); ++axis) bytes *= array.shape(axis);
+  require_count("columns", bytes / array.itemsize(), sizeof(T) / array.itemsize());
+}
+
 /// Rows of an array as structures of the same numbers.
 template <class T, class Array>
 std::span<T> rows_as(const Array& array) {
+  require_structures<T>(array, 1);
   return {reinterpret_cast<T*>(array.data()), array.shape(0)};
+}
+
+/// (N, K, columns) numbers as N rows of K structures.
+template <class T, class Array>
+ArrayView<T, 2> grid_as(const Array& array) {
+  require_structures<T>(array, 2);
+  return {reinterpret_cast<T*>(array.data()),
+          {static_cast<Index>(array.shape(0)), static_cast<Index>(array.shape(1))}};
 }
 
 /// A NumPy array with a copy of structures of `Number`, a row for each.
@@ -119,12 +219,6 @@ auto shown(std::span<const Row> rows, const Owner& owner) {
   const std::array<std::size_t, 2> shape{rows.size(), kColumns};
   return nb::ndarray<nb::numpy, const Number, nb::ndim<kRank>>(
       reinterpret_cast<const Number*>(rows.data()), kRank, shape.data(), nb::find(owner));
-}
-
-/// (N, K, 3) numbers as N rows of K poses.
-inline ArrayView<Pose, 2> pose_rows(const FloatsOut<3>& array) {
-  return {reinterpret_cast<Pose*>(array.data()),
-          {static_cast<Index>(array.shape(0)), static_cast<Index>(array.shape(1))}};
 }
 
 void bind_control(nb::module_& module);

@@ -14,6 +14,8 @@ using namespace nb::literals;
 
 namespace {
 
+using Counts = nb::ndarray<Index, nb::shape<4>, nb::c_contig, nb::device::cpu>;
+
 /// A command as Python has it: speed [m/s], turn rate [rad/s].
 std::pair<double, double> numbers(const mpc::Twist& twist) { return {twist.v, twist.w}; }
 
@@ -33,13 +35,13 @@ void bind_horizon(nb::module_& module) {
   nb::class_<mpc::Horizon>(module, "Horizon", "Commands for the next steps, in arrays of Python.")
       .def(
           "__init__",
-          [](mpc::Horizon* self, const mpc::CommandLimits& limits, const Floats<1>& units,
+          [](mpc::Horizon* self, const mpc::CommandLimits& limits, const Numbers<2>& units,
              const Integers<1>& columns, Index moves, const Integers<1>& blocks,
              const FloatsOut<2>& hessian, const FloatsOut<1>& gradient, const FloatsOut<1>& low,
              const FloatsOut<1>& high, const FloatsOut<1>& x, const FloatsOut<1>& steps,
              const FloatsOut<1>& solved, const IntegersOut<1>& shifted,
-             const FloatsOut<2>& solution, const FloatsOut<2>& nominal, const FloatsOut<1>& last,
-             const FloatsOut<2>& sent, const IntegersOut<1>& counts) {
+             const FloatsOut<2>& solution, const FloatsOut<2>& nominal, const NumbersOut<2>& last,
+             const FloatsOut<2>& sent, const Counts& counts) {
             new (self) mpc::Horizon{limits,
                                     {units.data()[0], units.data()[1]},
                                     view(columns),
@@ -80,6 +82,9 @@ void bind_path(nb::module_& module) {
           "__init__",
           [](mpc::ReferencePath* self, const Poses& path, const Floats<1>& lengths,
              const Floats<1>& speeds) {
+            require_room("poses", path.shape(0), 1);
+            require_count("lengths", lengths.shape(0), path.shape(0));
+            require_count("speeds", speeds.shape(0), path.shape(0));
             new (self) mpc::ReferencePath{poses(path), view(lengths), view(speeds)};
           },
           "poses"_a.noconvert(), "lengths"_a.noconvert(), "speeds"_a.noconvert(),
@@ -95,6 +100,7 @@ void bind_path(nb::module_& module) {
           "errors",
           [](const mpc::ReferencePath& self, double x, double y, double theta, Index index,
              double fraction) {
+            require_index("index", index, static_cast<Index>(self.poses.size()));
             const auto [offset, error, heading, curvature] =
                 mpc::errors(self, {x, y, theta}, {0.0, index, fraction});
             return nb::make_tuple(offset, error, heading, curvature);
@@ -121,7 +127,7 @@ void bind_tracker(nb::module_& module) {
       .def(
           "assemble",
           [](mpc::TrackingAssembly& self, const mpc::ReferencePath& track,
-             const mpc::Tuning& tuning, const OnePose& at, double along, const Floats<1>& before,
+             const mpc::Tuning& tuning, const OnePose& at, double along, const Numbers<2>& before,
              const Floats<1>& steps, const FloatsOut<2>& nominal, const FloatsOut<2>& hessian,
              const FloatsOut<1>& gradient) {
             self.assemble(track, tuning, pose(at), along, {before.data()[0], before.data()[1]},

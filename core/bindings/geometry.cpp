@@ -21,8 +21,8 @@ using namespace nb::literals;
 
 namespace {
 
-using BoxArray = nb::ndarray<const double, nb::shape<4>, nb::c_contig, nb::device::cpu>;
-using OnePoint = nb::ndarray<const double, nb::shape<2>, nb::c_contig, nb::device::cpu>;
+using BoxArray = Numbers<4>;
+using OnePoint = Numbers<2>;
 
 Vec2 point(const OnePoint& array) { return {array.data()[0], array.data()[1]}; }
 
@@ -30,13 +30,23 @@ Box box(const BoxArray& array) {
   return {array.data()[0], array.data()[1], array.data()[2], array.data()[3]};
 }
 
-/// The rows of an array as structs of as many numbers.
-template <class T>
-std::span<const T> rows(const Floats<2>& array) {
-  if (array.shape(1) * sizeof(double) != sizeof(T)) {
-    throw nb::type_error("an array has the wrong number of columns");
-  }
-  return {reinterpret_cast<const T*>(array.data()), array.shape(0)};
+/// The corners of a polygon that has some.
+Polygon corners_of(const Points& polygon) {
+  require_room("polygon", polygon.shape(0), 1);
+  return points(polygon);
+}
+
+/// Bends with their directions.
+Bends bends_of(const Points& places, const Points& incoming, const Points& outgoing) {
+  require_count("incoming", incoming.shape(0), places.shape(0));
+  require_count("outgoing", outgoing.shape(0), places.shape(0));
+  return {points(places), points(incoming), points(outgoing)};
+}
+
+/// Values of a grid that has some.
+ArrayView<const double, 2> field(const Floats<2>& values) {
+  require_room("values", values.size(), 1);
+  return view(values);
 }
 
 /// An array (N, 2) with these numbers.
@@ -76,30 +86,31 @@ void bind_shapes(nb::module_& module) {
       [](const Points& a, const Points& b) { return convex_distance(points(a), points(b)); },
       "a"_a.noconvert(), "b"_a.noconvert());
   module.def(
-      "polygon_area", [](const Points& polygon) { return polygon_area(points(polygon)); },
+      "polygon_area", [](const Points& polygon) { return polygon_area(corners_of(polygon)); },
       "polygon"_a.noconvert());
   module.def(
       "polygon_centroid",
       [](const Points& polygon) {
-        const Vec2 centre = polygon_centroid(points(polygon));
+        const Vec2 centre = polygon_centroid(corners_of(polygon));
         return std::tuple(centre.x, centre.y);
       },
       "polygon"_a.noconvert());
   module.def(
-      "polygon_inertia", [](const Points& polygon) { return polygon_inertia(points(polygon)); },
+      "polygon_inertia", [](const Points& polygon) { return polygon_inertia(corners_of(polygon)); },
       "polygon"_a.noconvert());
   module.def(
       "transform_points",
-      [](const OnePose& body, const Points& corners, const FloatsOut<2>& out) {
-        transform(pose(body), points(corners), reinterpret_cast<Vec2*>(out.data()));
+      [](const OnePose& body, const Points& corners, const PointsOut& out) {
+        transform(pose(body), points(corners), points_out(out, corners.shape(0)));
       },
       "pose"_a.noconvert(), "points"_a.noconvert(), "out"_a.noconvert());
   module.def(
       "transform_outlines",
       [](const Poses& bodies, const Points& vertices, const Integers<1>& offsets,
-         const FloatsOut<2>& out) {
-        transform(poses(bodies), Polygons{points(vertices), view(offsets)},
-                  reinterpret_cast<Vec2*>(out.data()));
+         const PointsOut& out) {
+        const Polygons outlines = polygons(vertices, offsets);
+        require_count("poses", bodies.shape(0), outlines.count());
+        transform(poses(bodies), outlines, points_out(out, vertices.shape(0)));
       },
       "poses"_a.noconvert(), "vertices"_a.noconvert(), "offsets"_a.noconvert(), "out"_a.noconvert(),
       ReleaseGil());
@@ -124,7 +135,10 @@ void bind_obstacles(nb::module_& module) {
           "__init__",
           [](Obstacles* self, const Points& vertices, const Integers<1>& offsets,
              const Floats<1>& radii, const Floats<2>& boxes) {
-            new (self) Obstacles{{points(vertices), view(offsets)}, view(radii), rows<Box>(boxes)};
+            const Polygons cores = polygons(vertices, offsets);
+            require_count("radii", radii.shape(0), cores.count());
+            require_count("boxes", boxes.shape(0), cores.count());
+            new (self) Obstacles{cores, view(radii), rows_as<const Box>(boxes)};
           },
           "vertices"_a.noconvert(), "offsets"_a.noconvert(), "radii"_a.noconvert(),
           "boxes"_a.noconvert(), nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(),
@@ -168,8 +182,11 @@ void bind_obstacles(nb::module_& module) {
       .def(
           "fill_clearance",
           [](const Obstacles& self, const FloatsOut<2>& out, Index first, Index last,
-             const OnePoint& origin,
-             double step) { fill_clearance(view(out), first, last, {point(origin), step}, self); },
+             const OnePoint& origin, double step) {
+            require_between("last", last, 0, view(out).size());
+            require_between("first", first, 0, last);
+            fill_clearance(view(out), first, last, {point(origin), step}, self);
+          },
           "out"_a.noconvert(), "first"_a, "last"_a, "origin"_a.noconvert(), "step"_a, ReleaseGil());
   module.def(
       "core_distance",
@@ -183,8 +200,8 @@ void bind_visibility(nb::module_& module) {
           "__init__",
           [](Regions* self, const Floats<2>& discs, const Floats<2>& half_planes,
              const Points& vertices, const Integers<1>& offsets) {
-            new (self) Regions{
-                rows<Disc>(discs), rows<HalfPlane>(half_planes), {points(vertices), view(offsets)}};
+            new (self) Regions{rows_as<const Disc>(discs), rows_as<const HalfPlane>(half_planes),
+                               polygons(vertices, offsets)};
           },
           "discs"_a.noconvert(), "half_planes"_a.noconvert(), "vertices"_a.noconvert(),
           "offsets"_a.noconvert(), nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(),
@@ -205,6 +222,7 @@ void bind_visibility(nb::module_& module) {
       .def(
           "nearest",
           [](const Regions& self, Index k, double x, double y) {
+            require_index("k", k, self.count());
             const Vec2 nearest = nearest_in_region(k, {x, y}, self);
             return std::tuple(nearest.x, nearest.y);
           },
@@ -213,7 +231,7 @@ void bind_visibility(nb::module_& module) {
       .def(
           "__init__",
           [](Bends* self, const Points& places, const Points& incoming, const Points& outgoing) {
-            new (self) Bends{points(places), points(incoming), points(outgoing)};
+            new (self) Bends{bends_of(places, incoming, outgoing)};
           },
           "points"_a.noconvert(), "incoming"_a.noconvert(), "outgoing"_a.noconvert(),
           nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>());
@@ -221,6 +239,7 @@ void bind_visibility(nb::module_& module) {
       .def(
           "__init__",
           [](Nodes* self, const Bends& bends, const Floats<1>& distances) {
+            require_count("distances", distances.shape(0), bends.count());
             new (self) Nodes{bends, view(distances)};
           },
           "bends"_a, "distances"_a.noconvert(), nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>());
@@ -255,6 +274,7 @@ void bind_visibility(nb::module_& module) {
           "node_leg",
           [](const GoalScene& self, double x, double y, double limit, Index hint, bool tangent_only,
              const Nodes& nodes) {
+            require_between("hint", hint, kNoLeg, nodes.places.count() - 1);
             const NodeLeg leg =
                 node_leg({x, y}, limit, hint, tangent_only, nodes, self.obstacles, self.gap);
             return std::tuple(leg.distance, leg.node);
@@ -284,6 +304,12 @@ void bind_visibility(nb::module_& module) {
       "relax",
       [](const Integers<1>& starts, const Integers<1>& ends, const Floats<1>& lengths,
          const FloatsOut<1>& distances, const IntegersOut<1>& parents) {
+        const std::size_t count = distances.shape(0);
+        require_count("starts", starts.shape(0), count + 1);
+        require_count("parents", parents.shape(0), count);
+        require_count("lengths", lengths.shape(0), ends.shape(0));
+        require_offsets("starts", view(starts), ends.shape(0));
+        require_indices("ends", view(ends), static_cast<Index>(count));
         relax({view(starts), view(ends), view(lengths)}, view(distances), view(parents));
       },
       "starts"_a.noconvert(), "ends"_a.noconvert(), "lengths"_a.noconvert(),
@@ -291,20 +317,22 @@ void bind_visibility(nb::module_& module) {
   module.def(
       "segment_crossings",
       [](const Floats<2>& first, const Floats<2>& second) {
-        return pairs<double>(segment_crossings(rows<Segment>(first), rows<Segment>(second)));
+        return pairs<double>(
+            segment_crossings(rows_as<const Segment>(first), rows_as<const Segment>(second)));
       },
       "first"_a.noconvert(), "second"_a.noconvert());
   module.def(
       "sample",
       [](const Floats<2>& values, double ox, double oy, double step, double x, double y) {
-        return sample(view(values), {{ox, oy}, step}, {x, y});
+        return sample(field(values), {{ox, oy}, step}, {x, y});
       },
       "values"_a.noconvert(), "ox"_a, "oy"_a, "step"_a, "x"_a, "y"_a);
   module.def(
       "sample_points",
       [](const Floats<2>& values, double ox, double oy, double step, const Points& at,
          const FloatsOut<1>& out) {
-        sample(view(values), {{ox, oy}, step}, points(at), view(out));
+        require_room("out", out.shape(0), at.shape(0));
+        sample(field(values), {{ox, oy}, step}, points(at), view(out));
       },
       "values"_a.noconvert(), "ox"_a, "oy"_a, "step"_a, "points"_a.noconvert(), "out"_a.noconvert(),
       ReleaseGil());
@@ -312,7 +340,15 @@ void bind_visibility(nb::module_& module) {
 
 void bind_path_search(nb::module_& module) {
   nb::class_<ObstacleGrid>(module, "ObstacleGrid", "The obstacles that reach into each cell.")
-      .def(nb::init<const Obstacles&, double>(), "obstacles"_a, "margin"_a, nb::keep_alive<1, 2>())
+      .def(
+          "__init__",
+          [](ObstacleGrid* self, const Obstacles& obstacles, double margin) {
+            for (const Box& box : obstacles.boxes) {
+              require_finite("boxes", box.x_max - box.x_min + (box.y_max - box.y_min) + margin);
+            }
+            new (self) ObstacleGrid(obstacles, margin);
+          },
+          "obstacles"_a, "margin"_a, nb::keep_alive<1, 2>())
       .def_prop_ro("shape", [](const ObstacleGrid& s) { return std::tuple(s.rows(), s.columns()); })
       .def_prop_ro("cell", &ObstacleGrid::cell)
       .def_prop_ro(
@@ -332,6 +368,13 @@ void bind_path_search(nb::module_& module) {
           [](Corners* self, const Points& places, const Points& incoming, const Points& outgoing,
              const Integers<1>& owner, const Integers<1>& first, const Points& middles,
              const Points& halves) {
+            const std::size_t count = owner.shape(0);
+            require_room("points", places.shape(0), count);
+            require_count("incoming", incoming.shape(0), count);
+            require_count("outgoing", outgoing.shape(0), count);
+            require_count("first", first.shape(0), middles.shape(0) + 1);
+            require_count("halves", halves.shape(0), middles.shape(0));
+            require_offsets("first", view(first), count);
             new (self) Corners{points(places), points(incoming), points(outgoing), view(owner),
                                view(first),    points(middles),  points(halves)};
           },
@@ -349,6 +392,7 @@ void bind_path_search(nb::module_& module) {
           "__init__",
           [](VisibilitySearch* self, const OnePoint& start, const Corners& corners,
              const GoalScene& scene, const ObstacleGrid& grid, double sliver) {
+            require_count("corners", corners.middles.size(), scene.obstacles.count());
             new (self) VisibilitySearch(point(start), corners, scene, grid, sliver);
           },
           "start"_a.noconvert(), "corners"_a, "scene"_a, "grid"_a, "sliver"_a,
@@ -365,7 +409,7 @@ void bind_shadows(nb::module_& module) {
       "fill_shadows",
       [](const Array<std::uint8_t, 2>& mask, double x, double y, const Points& corners,
          const Integers<1>& offsets, std::uint8_t value) {
-        ShadowPainter({points(corners), view(offsets)}).fill(view(mask), {x, y}, value);
+        ShadowPainter(polygons(corners, offsets)).fill(view(mask), {x, y}, value);
       },
       "mask"_a.noconvert(), "x"_a, "y"_a, "corners"_a.noconvert(), "offsets"_a.noconvert(),
       "value"_a, ReleaseGil());
@@ -373,8 +417,12 @@ void bind_shadows(nb::module_& module) {
       "fill_bend_distances",
       [](const Array<float, 3>& table, const OnePoint& origin, double step, const Bends& bends,
          const Floats<2>& between, const Points& corners, const Integers<1>& offsets, double gap) {
+        const auto count = static_cast<std::size_t>(bends.count());
+        require_count("table", table.shape(2), count);
+        require_count("between", between.shape(0), count);
+        require_count("between", between.shape(1), count);
         fill_bend_distances(view(table), {point(origin), step}, bends, view(between),
-                            {points(corners), view(offsets)}, gap);
+                            polygons(corners, offsets), gap);
       },
       "table"_a.noconvert(), "origin"_a.noconvert(), "step"_a, "bends"_a, "between"_a.noconvert(),
       "corners"_a.noconvert(), "offsets"_a.noconvert(), "gap"_a, ReleaseGil());

@@ -1,5 +1,6 @@
 #include <nanobind/stl/tuple.h>
 
+#include <algorithm>
 #include <tuple>
 
 #include "arrays.hpp"
@@ -17,6 +18,23 @@ namespace {
 gtsp::WalkClusters walk_clusters(const Floats<1>& prices, const Integers<1>& sizes,
                                  const Integers<3>& moves) {
   return {view(prices), view(sizes), view(moves)};
+}
+
+constexpr Index kMostReach = 1'000'000;  // neighbours; a problem has fewer
+
+/// An order of all clusters.
+std::span<const Index> order_of(const Integers<1>& order, Index clusters) {
+  const auto places = view(order);
+  require_count("order", places.size(), clusters);
+  std::vector<char> seen(places.size(), 0);
+  for (const Index cluster : places) {
+    require_index("order", cluster, clusters);
+    if (seen[static_cast<std::size_t>(cluster)]) {
+      refuse("order", std::to_string(cluster) + " twice", "of different clusters");
+    }
+    seen[static_cast<std::size_t>(cluster)] = 1;
+  }
+  return places;
 }
 
 std::span<const Index> as_span(const std::vector<Index>& values) { return values; }
@@ -56,7 +74,10 @@ void bind_gtsp(nb::module_& module) {
           "__init__",
           [](gtsp::RuinRecreate* self, const gtsp::Problem& problem, const Integers<1>& order,
              std::uint64_t seed, Index max_removed, double blink, Index reach) {
-            const auto places = view(order);
+            const auto places = order_of(order, problem.clusters());
+            require_between("max_removed", max_removed, 1,
+                            std::max(Index{1}, problem.clusters() - 2));
+            require_between("reach", reach, 0, kMostReach);
             new (self) gtsp::RuinRecreate(problem, {max_removed, blink, reach},
                                           {places.begin(), places.end()}, seed);
           },
@@ -64,7 +85,9 @@ void bind_gtsp(nb::module_& module) {
           nb::keep_alive<1, 2>())
       .def(
           "start",
-          [](gtsp::RuinRecreate& self, const Integers<1>& order) { self.start(view(order)); },
+          [](gtsp::RuinRecreate& self, const Integers<1>& order) {
+            self.start(order_of(order, static_cast<Index>(self.current().order.size())));
+          },
           "order"_a.noconvert(), ReleaseGil())
       .def("start_from_best", &gtsp::RuinRecreate::start_from_best)
       .def("run", &gtsp::RuinRecreate::run, "temperature"_a, "tolerance"_a, "rounds"_a,

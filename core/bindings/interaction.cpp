@@ -13,6 +13,23 @@ using CoverageOut = Array<float, 2>;
 
 RasterFrame raster_frame(const OnePose& frame, double cell) { return {pose(frame), cell}; }
 
+/// Requires poses and lengths of as many objects as a model has.
+template <class M>
+void require_objects(const M& model, const auto& objects, const auto& lengths) {
+  require_count("poses", objects.shape(0), model.radii().size());
+  require_count("lengths", lengths.shape(0), model.radii().size());
+}
+
+/// Poses of K objects at each of some poses of a path.
+ArrayView<Pose, 2> swept_poses(const FloatsOut<3>& out, const Poses& path, const PosesOut& objects,
+                               std::size_t count) {
+  require_room("path", path.shape(0), 1);
+  require_count("poses", objects.shape(0), count);
+  require_room("out", out.shape(0), path.shape(0));
+  require_count("columns of out", out.shape(1), count);
+  return grid_as<Pose>(out);
+}
+
 template <InteractionModel M>
 void bind_step(nb::class_<M> model) {
   model
@@ -20,6 +37,7 @@ void bind_step(nb::class_<M> model) {
           "advance",
           [](M& self, const OnePose& from, const OnePose& to, const PosesOut& objects,
              const FloatsOut<1>& lengths) {
+            require_objects(self, objects, lengths);
             return self.advance(pose(from), pose(to), poses(objects), view(lengths));
           },
           "robot_from"_a.noconvert(), "robot_to"_a.noconvert(), "poses"_a.noconvert(),
@@ -32,8 +50,9 @@ void bind_portions(nb::module_& module) {
       "cover_objects",
       [](const Poses& bodies, const Points& vertices, const Integers<1>& offsets,
          const OnePose& frame, double cell, const CoverageOut& out) {
-        cover_objects(poses(bodies), {points(vertices), view(offsets)}, raster_frame(frame, cell),
-                      view(out));
+        const Polygons outlines = polygons(vertices, offsets);
+        require_count("poses", bodies.shape(0), outlines.count());
+        cover_objects(poses(bodies), outlines, raster_frame(frame, cell), view(out));
       },
       "poses"_a.noconvert(), "vertices"_a.noconvert(), "offsets"_a.noconvert(),
       "frame"_a.noconvert(), "cell"_a, "out"_a.noconvert(), ReleaseGil());
@@ -41,15 +60,16 @@ void bind_portions(nb::module_& module) {
       "cover_sweep",
       [](const Poses& path, const Points& vertices, const Integers<1>& offsets,
          const OnePose& frame, double cell, const CoverageOut& out) {
-        cover_sweep(poses(path), {points(vertices), view(offsets)}, raster_frame(frame, cell),
-                    view(out));
+        cover_sweep(poses(path), polygons(vertices, offsets), raster_frame(frame, cell), view(out));
       },
       "path"_a.noconvert(), "vertices"_a.noconvert(), "offsets"_a.noconvert(),
       "frame"_a.noconvert(), "cell"_a, "out"_a.noconvert(), ReleaseGil());
   module.def(
       "step_works",
       [](const FloatsOut<3>& swept, const Floats<1>& masses, const FloatsOut<1>& works) {
-        step_works(pose_rows(swept), view(masses), view(works));
+        require_room("swept", swept.shape(0), works.shape(0) + 1);
+        require_count("masses", masses.shape(0), swept.shape(1));
+        step_works(grid_as<Pose>(swept), view(masses), view(works));
       },
       "swept"_a.noconvert(), "masses"_a.noconvert(), "works"_a.noconvert(), ReleaseGil());
   module.def(
@@ -57,9 +77,10 @@ void bind_portions(nb::module_& module) {
       [](const Poses& path, const PosesOut& floes, const IceBodies& bodies, double step,
          Index iterations, double hull_friction, double friction, double still, double margin,
          const FloatsOut<3>& out, const FloatsOut<1>& works) {
+        const auto rows = swept_poses(out, path, floes, bodies.radii.size());
+        require_count("works", works.shape(0), path.shape(0) - 1);
         sweep_near(poses(path), poses(floes), bodies,
-                   {step, iterations, hull_friction, friction, still}, margin, pose_rows(out),
-                   view(works));
+                   {step, iterations, hull_friction, friction, still}, margin, rows, view(works));
       },
       "path"_a.noconvert(), "poses"_a.noconvert(), "bodies"_a, "step"_a, "iterations"_a,
       "hull_friction"_a, "friction"_a, "still"_a, "margin"_a, "out"_a.noconvert(),
@@ -77,16 +98,23 @@ void bind_interaction(nb::module_& module) {
              const Integers<1>& offsets, const Floats<1>& radii, const Floats<1>& inverse_masses,
              const Floats<1>& inverse_gyration, const Points& wall_vertices,
              const Integers<1>& wall_offsets, const Floats<2>& wall_boxes) {
-            const auto* boxes = reinterpret_cast<const Box*>(wall_boxes.data());
-            new (self) Bodies{{points(robot_vertices), view(robot_offsets)},
+            const Polygons robot = polygons(robot_vertices, robot_offsets);
+            const Polygons objects = polygons(vertices, offsets);
+            const Polygons walls = polygons(wall_vertices, wall_offsets);
+            require_between("wall_parts", wall_parts, 0, robot.count());
+            require_count("radii", radii.shape(0), objects.count());
+            require_count("inverse_masses", inverse_masses.shape(0), objects.count());
+            require_count("inverse_gyration", inverse_gyration.shape(0), objects.count());
+            require_count("wall_boxes", wall_boxes.shape(0), walls.count());
+            new (self) Bodies{robot,
                               wall_parts,
                               robot_radius,
-                              {points(vertices), view(offsets)},
+                              objects,
                               view(radii),
                               view(inverse_masses),
                               view(inverse_gyration),
-                              {points(wall_vertices), view(wall_offsets)},
-                              {boxes, wall_boxes.shape(0)}};
+                              walls,
+                              rows_as<const Box>(wall_boxes)};
           },
           "robot_vertices"_a.noconvert(), "robot_offsets"_a.noconvert(), "wall_parts"_a,
           "robot_radius"_a, "vertices"_a.noconvert(), "offsets"_a.noconvert(),
@@ -111,6 +139,7 @@ void bind_interaction(nb::module_& module) {
           "advance",
           [](QuasiStatic& self, const OnePose& from, const OnePose& to, const PosesOut& objects,
              const FloatsOut<1>& lengths) {
+            require_objects(self, objects, lengths);
             return self.advance(pose(from), pose(to), poses(objects), view(lengths));
           },
           "robot_from"_a.noconvert(), "robot_to"_a.noconvert(), "poses"_a.noconvert(),
@@ -123,7 +152,8 @@ void bind_interaction(nb::module_& module) {
           "sweep",
           [](QuasiStatic& self, const Poses& path, const PosesOut& objects,
              const FloatsOut<3>& out) {
-            return self.sweep(poses(path), poses(objects), pose_rows(out));
+            const auto rows = swept_poses(out, path, objects, self.bodies().radii.size());
+            return self.sweep(poses(path), poses(objects), rows);
           },
           "path"_a.noconvert(), "poses"_a.noconvert(), "out"_a.noconvert(), ReleaseGil())
       .def_prop_ro("tests", &QuasiStatic::tests);
@@ -134,9 +164,13 @@ void bind_interaction(nb::module_& module) {
           [](IceBodies* self, const Points& hull_vertices, const Integers<1>& hull_offsets,
              double hull_radius, const Points& vertices, const Integers<1>& offsets,
              const Floats<1>& radii, const Floats<1>& masses, const Floats<1>& inverse_gyration) {
-            new (self) IceBodies{{points(hull_vertices), view(hull_offsets)},
+            const Polygons floes = polygons(vertices, offsets);
+            require_count("radii", radii.shape(0), floes.count());
+            require_count("masses", masses.shape(0), floes.count());
+            require_count("inverse_gyration", inverse_gyration.shape(0), floes.count());
+            new (self) IceBodies{polygons(hull_vertices, hull_offsets),
                                  hull_radius,
-                                 {points(vertices), view(offsets)},
+                                 floes,
                                  view(radii),
                                  view(masses),
                                  view(inverse_gyration)};
@@ -160,7 +194,8 @@ void bind_interaction(nb::module_& module) {
       .def(
           "sweep",
           [](IceContacts& self, const Poses& path, const PosesOut& floes, const FloatsOut<3>& out) {
-            return self.sweep(poses(path), poses(floes), pose_rows(out));
+            const auto rows = swept_poses(out, path, floes, self.bodies().radii.size());
+            return self.sweep(poses(path), poses(floes), rows);
           },
           "path"_a.noconvert(), "poses"_a.noconvert(), "out"_a.noconvert(), ReleaseGil());
 
@@ -183,6 +218,7 @@ void bind_interaction(nb::module_& module) {
               "__init__",
               [](CalledInteraction* self, std::uintptr_t function, std::uintptr_t context,
                  const Floats<1>& radii, const Floats<1>& inverse_masses, const nb::object&) {
+                require_count("inverse_masses", inverse_masses.shape(0), radii.shape(0));
                 new (self) CalledInteraction(reinterpret_cast<CalledInteraction::Advance>(function),
                                              reinterpret_cast<void*>(context), view(radii),
                                              view(inverse_masses));

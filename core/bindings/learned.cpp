@@ -10,7 +10,8 @@ void bind_learned(nb::module_& module) {
       "cast_rays",
       [](const FloatsOut<1>& lengths, double x, double y, double heading, const Points& vertices,
          const Integers<1>& offsets) {
-        cast_rays(view(lengths), {x, y, heading}, {points(vertices), view(offsets)});
+        require_room("lengths", lengths.shape(0), 1);
+        cast_rays(view(lengths), {x, y, heading}, polygons(vertices, offsets));
       },
       "lengths"_a.noconvert(), "x"_a, "y"_a, "heading"_a, "vertices"_a.noconvert(),
       "offsets"_a.noconvert(), ReleaseGil());

@@ -3,13 +3,19 @@
 namespace nb = nanobind;
 
 NB_MODULE(_core, module) {
-  module.doc() = "The compiled core of pushplan (C++, see core/). Arguments are not checked.";
+  module.doc() = "The compiled core of pushplan (C++, see core/).";
   // caches of Python hold shapes until the interpreter ends: no leak, and nothing to print
   nb::set_leak_warnings(false);
   module.attr("SOURCES") = PUSHPLAN_SOURCES;
   module.attr("COMPILER") = PUSHPLAN_COMPILER;
-  // caches of Python modules hold objects of these types until the interpreter ends
-  nanobind::set_leak_warnings(false);
+  nb::register_exception_translator([](const std::exception_ptr& thrown, void*) {
+    try {
+      std::rethrow_exception(thrown);
+    } catch (const pushplan::bindings::Refusal& refusal) {
+      const auto errors = nb::module_::import_("pushplan.errors");
+      PyErr_SetString(errors.attr("InvalidInputError").ptr(), refusal.what());
+    }
+  });
   // rooms whose types others take come first
   auto geometry = module.def_submodule("geometry", "Shapes, obstacles and distances around them.");
   pushplan::bindings::bind_geometry(geometry);

@@ -1,6 +1,9 @@
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/tuple.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "arrays.hpp"
 #include "goal.hpp"
 #include "pushplan/motion/goal_region.hpp"
@@ -18,14 +21,25 @@ using namespace nb::literals;
 
 namespace {
 
+using Corner = nb::ndarray<const Index, nb::shape<2>, nb::c_contig, nb::device::cpu>;
 using LatticeSearch = AStar<PoseLattice>;
 
 PathBuffer buffer(const PosesOut& out, const FloatsOut<1>& curvatures) {
+  require_count("curvatures", curvatures.shape(0), out.shape(0));
   return {poses(out), view(curvatures)};
 }
 
+/// A path of which pose `last` is one.
+Path path_to(const Poses& path, const Floats<1>& curvatures, Index last) {
+  require_count("curvatures", curvatures.shape(0), path.shape(0));
+  require_index("last", last, static_cast<Index>(path.shape(0)));
+  return {poses(path), view(curvatures)};
+}
+
+using ThreeArcs = nb::ndarray<double, nb::shape<3, 2>, nb::c_contig, nb::device::cpu>;
+
 /// The numbers of `PoseLattice.goal` of Python.
-LatticeGoal lattice_goal(const Floats<1>& numbers) {
+LatticeGoal lattice_goal(const Numbers<4>& numbers) {
   const double* n = numbers.data();
   return {n[0] == 0.0, n[1], n[2], n[3]};
 }
@@ -33,7 +47,7 @@ LatticeGoal lattice_goal(const Floats<1>& numbers) {
 void bind_paths(nb::module_& module) {
   module.def(
       "dubins",
-      [](const OnePose& start, const OnePose& end, double radius, const FloatsOut<2>& arcs) {
+      [](const OnePose& start, const OnePose& end, double radius, const ThreeArcs& arcs) {
         const DubinsPath path = dubins(pose(start), pose(end), radius);
         std::copy(path.arcs.begin(), path.arcs.end(), reinterpret_cast<Arc*>(arcs.data()));
         return path.length;
@@ -41,7 +55,7 @@ void bind_paths(nb::module_& module) {
       "start"_a.noconvert(), "end"_a.noconvert(), "radius"_a, "arcs"_a.noconvert());
   module.def(
       "along_arc",
-      [](const OnePose& start, double length, double curvature, const FloatsOut<1>& out) {
+      [](const OnePose& start, double length, double curvature, const OnePoseOut& out) {
         *reinterpret_cast<Pose*>(out.data()) = along_arc(pose(start), {length, curvature});
       },
       "start"_a.noconvert(), "length"_a, "curvature"_a, "out"_a.noconvert());
@@ -56,15 +70,15 @@ void bind_paths(nb::module_& module) {
       "curvatures"_a.noconvert());
   module.def(
       "in_goal",
-      [](double x, double y, const Floats<1>& goal) { return goal_region(goal).contains({x, y}); },
+      [](double x, double y, const Numbers<5>& goal) { return goal_region(goal).contains({x, y}); },
       "x"_a, "y"_a, "goal"_a.noconvert());
   module.def(
       "distance_to_goal",
-      [](double x, double y, const Floats<1>& goal) { return goal_region(goal).distance({x, y}); },
+      [](double x, double y, const Numbers<5>& goal) { return goal_region(goal).distance({x, y}); },
       "x"_a, "y"_a, "goal"_a.noconvert());
   module.def(
       "displace",
-      [](const OnePose& at, double sideways, double turn, const FloatsOut<1>& out) {
+      [](const OnePose& at, double sideways, double turn, const OnePoseOut& out) {
         *reinterpret_cast<Pose*>(out.data()) = displace(pose(at), sideways, turn);
       },
       "pose"_a.noconvert(), "sideways"_a, "turn"_a, "out"_a.noconvert());
@@ -72,7 +86,9 @@ void bind_paths(nb::module_& module) {
       "copy_start",
       [](const Poses& path, const Floats<1>& curvatures, Index last, const PosesOut& out,
          const FloatsOut<1>& out_curvatures) {
-        return copy_start({poses(path), view(curvatures)}, last, buffer(out, out_curvatures));
+        const Path whole = path_to(path, curvatures, last);
+        require_room("out", out.shape(0), static_cast<std::size_t>(last + 1));
+        return copy_start(whole, last, buffer(out, out_curvatures));
       },
       "poses"_a.noconvert(), "curvatures"_a.noconvert(), "last"_a, "out"_a.noconvert(),
       "out_curvatures"_a.noconvert());
@@ -89,10 +105,19 @@ void bind_paths(nb::module_& module) {
       "copy_rest",
       [](const Poses& path, const Floats<1>& curvatures, Index last, const PosesOut& out,
          const FloatsOut<1>& out_curvatures, Index size) {
-        return copy_rest({poses(path), view(curvatures)}, last, buffer(out, out_curvatures), size);
+        const Path whole = path_to(path, curvatures, last);
+        const Index rest = whole.size() - 1 - last;
+        require_between("size", size, 1, static_cast<Index>(out.shape(0)) - rest);
+        return copy_rest(whole, last, buffer(out, out_curvatures), size);
       },
       "poses"_a.noconvert(), "curvatures"_a.noconvert(), "last"_a, "out"_a.noconvert(),
       "out_curvatures"_a.noconvert(), "size"_a);
+}
+
+/// Requires a place on a map that may be large, but not so large that its cells cannot be counted.
+void require_countable(double place) {
+  constexpr double kMost = 1e7;
+  if (!(std::abs(place) <= kMost)) refuse("outlines", std::to_string(place), "within 1e7 cells");
 }
 
 void bind_maps(nb::module_& module) {
@@ -101,10 +126,15 @@ void bind_maps(nb::module_& module) {
       [](const Points& outlines, const Integers<1>& offsets, const Points& centres,
          const Floats<1>& radii, const Floats<1>& totals, double exponent, double soft,
          const FloatsOut<2>& grid) {
-        add_floes({{points(outlines), view(offsets)},
-                   points(centres),
-                   view(radii),
-                   {view(totals), exponent, soft}},
+        const Polygons floes = polygons(outlines, offsets);
+        require_count("centres", centres.shape(0), floes.count());
+        require_count("radii", radii.shape(0), floes.count());
+        require_count("totals", totals.shape(0), floes.count());
+        for (const Vec2 corner : floes.vertices) {
+          require_countable(corner.x);
+          require_countable(corner.y);
+        }
+        add_floes({floes, points(centres), view(radii), {view(totals), exponent, soft}},
                   view(grid));
       },
       "outlines"_a.noconvert(), "offsets"_a.noconvert(), "centres"_a.noconvert(),
@@ -114,13 +144,17 @@ void bind_maps(nb::module_& module) {
       "block",
       [](const Points& outlines, const Integers<1>& offsets, double margin,
          const FloatsOut<2>& grid) {
-        block_cells({points(outlines), view(offsets)}, margin, view(grid));
+        block_cells(polygons(outlines, offsets), margin, view(grid));
       },
       "outlines"_a.noconvert(), "offsets"_a.noconvert(), "margin"_a, "grid"_a.noconvert(),
       ReleaseGil());
   module.def(
       "prefix_sums",
-      [](const Floats<2>& grid, const FloatsOut<2>& sums) { prefix_sums(view(grid), view(sums)); },
+      [](const Floats<2>& grid, const FloatsOut<2>& sums) {
+        require_count("sums", sums.shape(0), grid.shape(1));
+        require_count("columns of sums", sums.shape(1), grid.shape(0) + 1);
+        prefix_sums(view(grid), view(sums));
+      },
       "grid"_a.noconvert(), "sums"_a.noconvert(), ReleaseGil());
   module.def(
       "place_costs",
@@ -136,11 +170,14 @@ void bind_maps(nb::module_& module) {
       "costs"_a.noconvert(), ReleaseGil());
 }
 
+constexpr Index kMostReach = 10'000;  // of primitives [steps]; 8 are usual
+
 void bind_primitives(nb::module_& module) {
   module.def(
       "fill_connections",
       [](double heading, double target, double radius, Index reach, double slack,
          const FloatsOut<2>& out) {
+        require_between("reach", reach, 0, kMostReach);
         return find_connections(heading, target, {radius, reach, slack}, rows_as<Connection>(out));
       },
       "heading"_a, "target"_a, "radius"_a, "reach"_a, "slack"_a, "out"_a.noconvert(), ReleaseGil());
@@ -148,6 +185,9 @@ void bind_primitives(nb::module_& module) {
       "primitive_boxes",
       [](const Floats<1>& headings, const Floats<3>& pieces, const Floats<1>& lengths,
          const FloatsOut<2>& boxes) {
+        require_count("pieces", pieces.shape(0), headings.shape(0));
+        require_count("lengths", lengths.shape(0), headings.shape(0));
+        require_count("boxes", boxes.shape(0), headings.shape(0));
         primitive_boxes(view(headings), rows_as<const std::array<Arc, 3>>(pieces), view(lengths),
                         rows_as<OriginBox>(boxes));
       },
@@ -160,7 +200,7 @@ void bind_primitives(nb::module_& module) {
         std::vector<ColumnRun> runs;
         {
           nb::gil_scoped_release released;
-          runs = sweep_cells(heading, rows_as<const Arc>(pieces), {points(vertices), view(offsets)},
+          runs = sweep_cells(heading, rows_as<const Arc>(pieces), polygons(vertices, offsets),
                              reach, spacing);
         }
         return copied_rows<Index>(std::span<const ColumnRun>(runs));
@@ -169,15 +209,23 @@ void bind_primitives(nb::module_& module) {
       "reach"_a, "spacing"_a, kOwned);
 }
 
+Index node_count(const PoseLattice& lattice) {
+  return (static_cast<Index>(lattice.first.size()) - 1) * lattice.rows * lattice.columns;
+}
+
+void require_node(const PoseLattice& lattice, Index node) {
+  require_index("node", node, node_count(lattice));
+}
+
 void bind_lattice(nb::module_& module) {
   nb::class_<PoseLattice>(module, "PoseLattice", "Places and headings joined by motion primitives.")
       .def(
           "__init__",
           [](PoseLattice* self, Index rows, Index columns, double step, Index cells,
-             const Integers<1>& corner, const Integers<1>& first, const Integers<2>& ends,
+             const Corner& corner, const Integers<1>& first, const Integers<2>& ends,
              const Floats<1>& lengths, const Floats<2>& boxes, const Integers<1>& run_first,
              const Integers<2>& runs, const Floats<1>& cost_sums, const Floats<1>& blocked_sums,
-             Index stride, const Floats<2>& planes, const Floats<1>& goal,
+             Index stride, const Floats<2>& planes, const Numbers<4>& goal,
              const Floats<2>& row_bounds, const Floats<2>& place_costs, double inflation) {
             new (self) PoseLattice{rows,
                                    columns,
@@ -213,6 +261,11 @@ void bind_lattice(nb::module_& module) {
           "successors",
           [](const PoseLattice& self, Index node, const IntegersOut<1>& nodes,
              const FloatsOut<1>& costs, const IntegersOut<1>& edges) {
+            require_node(self, node);
+            const auto most = static_cast<std::size_t>(self.ends.size());
+            require_room("nodes", nodes.shape(0), most);
+            require_room("costs", costs.shape(0), most);
+            require_room("edges", edges.shape(0), most);
             Index count = 0;
             self.expand(node, [&](Index successor, double cost, Index edge) {
               nodes.data()[count] = successor;
@@ -226,16 +279,37 @@ void bind_lattice(nb::module_& module) {
       .def(
           "place_of",
           [](const PoseLattice& self, Index node) {
+            require_node(self, node);
             const auto [heading, row, column] = self.place_of(node);
             return std::tuple(heading, row, column);
           },
           "node"_a, "Heading, row and column of a node.")
-      .def("estimate", &PoseLattice::estimate, "node"_a)
-      .def("is_goal", &PoseLattice::is_goal, "node"_a)
-      .def("edge_cost", &PoseLattice::edge_cost, "row"_a, "column"_a, "primitive"_a)
+      .def(
+          "estimate",
+          [](const PoseLattice& self, Index node) {
+            require_node(self, node);
+            return self.estimate(node);
+          },
+          "node"_a)
+      .def(
+          "is_goal",
+          [](const PoseLattice& self, Index node) {
+            require_node(self, node);
+            return self.is_goal(node);
+          },
+          "node"_a)
+      .def(
+          "edge_cost",
+          [](const PoseLattice& self, Index row, Index column, Index primitive) {
+            require_index("row", row, self.rows);
+            require_index("column", column, self.columns);
+            require_index("primitive", primitive, static_cast<Index>(self.ends.size()));
+            return self.edge_cost(row, column, primitive);
+          },
+          "row"_a, "column"_a, "primitive"_a)
       .def(
           "within",
-          [](const PoseLattice& self, Index u, Index v, const Floats<1>& box) {
+          [](const PoseLattice& self, Index u, Index v, const Numbers<4>& box) {
             return within(self.planes, u, v, *reinterpret_cast<const OriginBox*>(box.data()));
           },
           "row"_a, "column"_a, "box"_a.noconvert());
@@ -243,6 +317,8 @@ void bind_lattice(nb::module_& module) {
       "swath_sum",
       [](const Floats<1>& sums, const Integers<2>& runs, Index begin, Index end, Index at) {
         const auto all = rows_as<const SwathRun>(runs);
+        require_between("end", end, 0, static_cast<Index>(all.size()));
+        require_between("begin", begin, 0, end);
         return swath_sum(
             view(sums),
             all.subspan(static_cast<std::size_t>(begin), static_cast<std::size_t>(end - begin)),
@@ -251,9 +327,28 @@ void bind_lattice(nb::module_& module) {
       "sums"_a.noconvert(), "runs"_a.noconvert(), "begin"_a, "end"_a, "at"_a);
 
   nb::class_<LatticeSearch>(module, "LatticeSearch", "A* over a `PoseLattice`.")
-      .def(nb::init<PoseLattice, Index>(), "lattice"_a, "size"_a, nb::keep_alive<1, 2>())
-      .def("restart", &LatticeSearch::restart, "lattice"_a, nb::keep_alive<1, 2>())
-      .def("start", &LatticeSearch::start, "node"_a, "cost"_a = 0.0, "bound"_a = 0.0, "edge"_a = -1)
+      .def(
+          "__init__",
+          [](LatticeSearch* self, const PoseLattice& lattice, Index size) {
+            require_room("size", static_cast<std::size_t>(std::max(size, Index{0})),
+                         static_cast<std::size_t>(node_count(lattice)));
+            new (self) LatticeSearch(lattice, size);
+          },
+          "lattice"_a, "size"_a, nb::keep_alive<1, 2>())
+      .def(
+          "restart",
+          [](LatticeSearch& self, const PoseLattice& lattice) {
+            require_between("nodes", node_count(lattice), 0, self.tree().size());
+            self.restart(lattice);
+          },
+          "lattice"_a, nb::keep_alive<1, 2>())
+      .def(
+          "start",
+          [](LatticeSearch& self, Index node, double cost, double bound, Index edge) {
+            require_index("node", node, self.tree().size());
+            self.start(node, cost, bound, edge);
+          },
+          "node"_a, "cost"_a = 0.0, "bound"_a = 0.0, "edge"_a = -1)
       .def("run", &LatticeSearch::run, "budget"_a, ReleaseGil())
       .def_prop_ro("goal", &LatticeSearch::goal)
       .def_prop_ro("cost", &LatticeSearch::cost)

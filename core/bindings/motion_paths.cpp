@@ -23,7 +23,7 @@ void bind_collision(nb::module_& module) {
       .def(
           "__init__",
           [](Footprint* self, const Points& vertices, const Integers<1>& offsets, double radius) {
-            new (self) Footprint{{points(vertices), view(offsets)}, radius};
+            new (self) Footprint{polygons(vertices, offsets), radius};
           },
           "vertices"_a.noconvert(), "offsets"_a.noconvert(), "radius"_a, nb::keep_alive<1, 2>(),
           nb::keep_alive<1, 3>())
@@ -32,11 +32,14 @@ void bind_collision(nb::module_& module) {
       .def(
           "__init__",
           [](ConvexObstacles* self, const Points& vertices, const Integers<1>& offsets,
-             const Floats<2>& boxes, const Floats<2>& groups, const Floats<1>& bounds) {
-            new (self) ConvexObstacles{{points(vertices), view(offsets)},
-                                       rows_as<const Box>(boxes),
-                                       rows_as<const Box>(groups),
-                                       *reinterpret_cast<const Box*>(bounds.data())};
+             const Floats<2>& boxes, const Floats<2>& groups, const Numbers<4>& bounds) {
+            const Polygons shapes = polygons(vertices, offsets);
+            require_count("boxes", boxes.shape(0), shapes.count());
+            constexpr Index kGroup = ConvexObstacles::kGroup;
+            require_count("groups", groups.shape(0), (shapes.count() + kGroup - 1) / kGroup);
+            new (self)
+                ConvexObstacles{shapes, rows_as<const Box>(boxes), rows_as<const Box>(groups),
+                                *reinterpret_cast<const Box*>(bounds.data())};
           },
           "vertices"_a.noconvert(), "offsets"_a.noconvert(), "boxes"_a.noconvert(),
           "groups"_a.noconvert(), "bounds"_a.noconvert(), nb::keep_alive<1, 2>(),
@@ -70,6 +73,22 @@ void bind_collision(nb::module_& module) {
           "pose"_a.noconvert());
 }
 
+/// Requires a path of `count` poses among the objects of a model, of which `first` is one.
+void require_swept(const SweptPath& path, Index first, Index count, std::size_t objects) {
+  require_between("count", count, 1, static_cast<Index>(path.poses.size()));
+  require_index("first", first, count);
+  require_count("objects of path", objects, path.objects.extent(1));
+}
+
+/// Uniform draws of at least 0 and below 1.
+template <class T>
+std::span<const T> unit_draws(const Floats<2>& draws) {
+  for (const double draw : std::span(draws.data(), draws.size())) {
+    if (!(draw >= 0.0 && draw < 1.0)) refuse("draws", std::to_string(draw), "in [0, 1)");
+  }
+  return rows_as<const T>(draws);
+}
+
 /// What depends on the model of interaction.
 template <InteractionModel M>
 void bind_sweeps(nb::module_& module) {
@@ -77,6 +96,7 @@ void bind_sweeps(nb::module_& module) {
       "sweep_cost",
       [](const SweptPath& path, Index first, Index count, double limit, Index patience,
          const PathProblem& problem, M& model) {
+        require_swept(path, first, count, model.radii().size());
         return PathSweep<M>(problem, model).cost(path, first, count, limit, patience);
       },
       "path"_a, "first"_a, "count"_a, "limit"_a, "patience"_a, "problem"_a, "model"_a,
@@ -85,8 +105,12 @@ void bind_sweeps(nb::module_& module) {
       "shortcut",
       [](const SweptPath& path, Index count, double cost, const Floats<2>& draws,
          const Floats<2>& normals, const SweptPath& trial, const PathProblem& problem, M& model) {
+        require_swept(path, 0, count, model.radii().size());
+        require_swept(trial, 0, count, model.radii().size());
+        require_room("path", path.poses.size(), trial.poses.size());
+        require_count("normals", normals.shape(0), draws.shape(0));
         const PricedPath found =
-            shortcut(path, {count, cost}, rows_as<const ShortcutDraw>(draws),
+            shortcut(path, {count, cost}, unit_draws<ShortcutDraw>(draws),
                      rows_as<const ShortcutShift>(normals), trial, problem, model);
         return std::pair(found.count, found.cost);
       },
@@ -96,6 +120,8 @@ void bind_sweeps(nb::module_& module) {
       "turn_freely",
       [](const PathProblem& problem, M& model, const OnePose& start, const Poses& objects,
          double angle, const PosesOut& out) {
+        require_count("objects", objects.shape(0), model.radii().size());
+        require_room("out", out.shape(0), objects.shape(0));
         const SpotTurn turn = turn_freely(problem, model, pose(start), poses(objects), angle);
         std::copy(turn.objects.begin(), turn.objects.end(), poses(out).begin());
         return std::pair(turn.angle, turn.error);
@@ -109,7 +135,7 @@ void bind_problems(nb::module_& module) {
       .def(
           "__init__",
           [](PathProblem* self, double robot_mass, double push_weight, double turning_radius,
-             double spacing, double jam_length, double displacement, const Floats<1>& goal,
+             double spacing, double jam_length, double displacement, const Numbers<5>& goal,
              const Footprint& footprint, const ConvexObstacles& walls) {
             new (self)
                 PathProblem{robot_mass,   push_weight,       turning_radius, spacing, jam_length,
@@ -123,8 +149,13 @@ void bind_problems(nb::module_& module) {
           "__init__",
           [](SweptPath* self, const PosesOut& path, const FloatsOut<1>& curvatures,
              const FloatsOut<3>& objects, const FloatsOut<1>& lengths, const FloatsOut<1>& works) {
-            new (self) SweptPath{poses(path), view(curvatures), pose_rows(objects), view(lengths),
-                                 view(works)};
+            const std::size_t count = path.shape(0);
+            require_count("curvatures", curvatures.shape(0), count);
+            require_count("objects", objects.shape(0), count);
+            require_count("lengths", lengths.shape(0), count);
+            require_count("works", works.shape(0), count);
+            new (self) SweptPath{poses(path), view(curvatures), grid_as<Pose>(objects),
+                                 view(lengths), view(works)};
           },
           "poses"_a.noconvert(), "curvatures"_a.noconvert(), "objects"_a.noconvert(),
           "lengths"_a.noconvert(), "works"_a.noconvert(), nb::keep_alive<1, 2>(),
@@ -134,6 +165,7 @@ void bind_problems(nb::module_& module) {
       "lay_out",
       [](const OnePose& start, const Floats<2>& arcs, const SweptPath& path,
          const PathProblem& problem) {
+        require_room("path", path.poses.size(), 1);
         return lay_out(pose(start), rows_as<const Arc>(arcs), path, problem);
       },
       "start"_a.noconvert(), "arcs"_a.noconvert(), "path"_a, "problem"_a);
@@ -141,6 +173,8 @@ void bind_problems(nb::module_& module) {
   bind_sweeps<IceInteraction>(module);
   bind_sweeps<CalledInteraction>(module);
 }
+
+constexpr Index kMostBoxes = 30'000;  // of poses, in each direction
 
 /// An exploration with the moves that it tries.
 struct OwnRoomExploration {
@@ -154,8 +188,12 @@ void bind_ways_out(nb::module_& module) {
       [](const FloatsOut<2>& out, double x, double y, double cell, const Points& vertices,
          const Integers<1>& offsets, const Integers<2>& within, const Floats<1>& reach,
          const Floats<1>& weight) {
-        fill_cell_weights(view(out), {{x, y}, cell}, {points(vertices), view(offsets)},
-                          rows_as<const CellBox>(within), {view(reach), view(weight)});
+        const Polygons shapes = polygons(vertices, offsets);
+        require_count("within", within.shape(0), shapes.count());
+        require_count("reach", reach.shape(0), shapes.count());
+        require_count("weight", weight.shape(0), shapes.count());
+        fill_cell_weights(view(out), {{x, y}, cell}, shapes, rows_as<const CellBox>(within),
+                          {view(reach), view(weight)});
       },
       "out"_a.noconvert(), "x"_a, "y"_a, "cell"_a, "vertices"_a.noconvert(),
       "offsets"_a.noconvert(), "within"_a.noconvert(), "reach"_a.noconvert(),
@@ -183,9 +221,11 @@ void bind_ways_out(nb::module_& module) {
       .def(
           "__init__",
           [](OwnRoomExploration* self, const Footprint& footprint, const ConvexObstacles& walls,
-             const Floats<1>& goal, double spacing, const Floats<2>& moves, double reach,
+             const Numbers<5>& goal, double spacing, const Floats<2>& moves, double reach,
              double clearance, bool breadth, const OnePose& start, double side, double turn,
              Index half, Index headings, Index capacity) {
+            require_between("half", half, 0, kMostBoxes);
+            require_between("headings", headings, 1, kMostBoxes);
             const auto given = rows_as<const Arc>(moves);
             std::vector<Arc> own(given.begin(), given.end());
             const RoomRules rules{own, reach, clearance, breadth};
@@ -219,7 +259,7 @@ void bind_ways_out(nb::module_& module) {
       .def(
           "steer",
           [](Steering& self, const OnePose& start, const OnePose& target, double sampled,
-             double backward, const FloatsOut<1>& out) {
+             double backward, const OnePoseOut& out) {
             const SteeredArc found = self.steer(pose(start), pose(target), sampled, backward);
             if (found.arc.length != 0.0) *reinterpret_cast<Pose*>(out.data()) = found.end;
             return std::pair(found.arc.curvature, found.arc.length);

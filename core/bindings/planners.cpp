@@ -45,12 +45,23 @@ class PushSearchOver final : public PushSearch {
   AStar<PushLattice<M>> search_;
 };
 
+/// Requires the cells of a grid that are counted row by row.
+void require_cells(Index first, Index last, Index count) {
+  require_between("last", last, 0, count);
+  require_between("first", first, 0, last);
+}
+
 void bind_cost_to_go(nb::module_& module) {
   nb::class_<CostToGo>(module, "CostToGo", "A table of lengths to the goal.")
       .def(
           "__init__",
           [](CostToGo* self, const Floats<3>& values, const Floats<2>& floor, double x, double y,
-             double cell) { new (self) CostToGo{view(values), view(floor), {{x, y}, cell}}; },
+             double cell) {
+            require_room("values", values.size(), 1);
+            require_count("rows of floor", floor.shape(0), values.shape(0));
+            require_count("columns of floor", floor.shape(1), values.shape(1));
+            new (self) CostToGo{view(values), view(floor), {{x, y}, cell}};
+          },
           "values"_a.noconvert(), "floor"_a.noconvert(), "x"_a, "y"_a, "cell"_a,
           nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>())
       .def_prop_ro("shape",
@@ -68,10 +79,14 @@ void bind_cost_to_go(nb::module_& module) {
           "sweep",
           [](const CostToGo& self, const FloatsOut<3>& values, const Flags3& free,
              const Integers<1>& order, const Floats<3>& ends, double length) {
-            const ArrayView<const Pose, 2> poses(
-                reinterpret_cast<const Pose*>(ends.data()),
-                {static_cast<Index>(ends.shape(0)), static_cast<Index>(ends.shape(1))});
-            return sweep_cost_to_go(view(values), self, view(free), view(order), {poses, length});
+            for (const std::size_t axis : {0, 1, 2}) {
+              require_count("values", values.shape(axis), self.values.extent(axis));
+              require_count("free", free.shape(axis), self.values.extent(axis));
+            }
+            require_indices("order", view(order), self.floor.size());
+            require_count("ends", ends.shape(0), self.headings());
+            return sweep_cost_to_go(view(values), self, view(free), view(order),
+                                    {grid_as<const Pose>(ends), length});
           },
           "values"_a.noconvert(), "free"_a.noconvert(), "order"_a.noconvert(), "ends"_a.noconvert(),
           "length"_a, ReleaseGil(), "`values` are those of the table, to write to.");
@@ -79,14 +94,18 @@ void bind_cost_to_go(nb::module_& module) {
       "mark_free",
       [](const Array<bool, 3>& free, Index first, Index last, double x, double y, double cell,
          const Footprint& footprint, const ConvexObstacles& walls) {
+        require_cells(first, last, static_cast<Index>(free.shape(0) * free.shape(1)));
         mark_free(view(free), first, last, {{x, y}, cell}, footprint, walls);
       },
       "free"_a.noconvert(), "first"_a, "last"_a, "x"_a, "y"_a, "cell"_a, "footprint"_a, "walls"_a,
       ReleaseGil());
   module.def(
       "flood",
-      [](const Flags2& open, double x, double y, double cell, const Floats<1>& goal, Index centre,
+      [](const Flags2& open, double x, double y, double cell, const Numbers<5>& goal, Index centre,
          const FloatsOut<2>& lengths) {
+        require_count("rows of lengths", lengths.shape(0), open.shape(0));
+        require_count("columns of lengths", lengths.shape(1), open.shape(1));
+        require_between("centre", centre, -1, static_cast<Index>(open.size()) - 1);
         Flood found;
         {
           nb::gil_scoped_release released;
@@ -99,6 +118,25 @@ void bind_cost_to_go(nb::module_& module) {
       "lengths"_a.noconvert(), kOwned);
 }
 
+constexpr Index kMostNodes = Index{1} << 31;  // of a tree
+
+/// Requires a tree that has a root, and a model of as many objects.
+template <InteractionModel M>
+void require_planted(const PushTree& tree, const M& model) {
+  require_room("nodes of the tree", static_cast<std::size_t>(tree.count()), 1);
+  require_count("objects of the tree", tree.objects(0).size(), model.radii().size());
+}
+
+/// The shape of cells of a tree.
+PushTree::CellShape cell_shape(Index rows, Index columns, Index headings, Index signatures) {
+  constexpr Index kMost = 30'000;  // so that their product is an Index
+  require_between("rows", rows, 1, kMost);
+  require_between("columns", columns, 1, kMost);
+  require_between("headings", headings, 1, kMost);
+  require_between("signatures", signatures, 1, kMost);
+  return {rows, columns, headings, signatures};
+}
+
 template <InteractionModel M>
 void bind_push_searches(nb::module_& module) {
   module.def(
@@ -106,6 +144,12 @@ void bind_push_searches(nb::module_& module) {
       [](PushTree& tree, const CostToGo& table, const Floats<1>& curvatures, double length,
          double inflation, double pruning_factor, const Floats<1>& masses, double bound,
          const PathProblem& problem, M& model, Index size) -> std::unique_ptr<PushSearch> {
+        require_planted(tree, model);
+        require_count("masses", masses.shape(0), model.radii().size());
+        require_between("size", size, 2 * tree.capacity(), 2 * kMostNodes);
+        require_between("rows of the table", table.rows(), 1, tree.cells().rows);
+        require_between("columns of the table", table.columns(), 1, tree.cells().columns);
+        require_between("headings of the table", table.headings(), 1, tree.cells().headings);
         const Branching branching{view(curvatures), length, inflation, pruning_factor,
                                   view(masses)};
         return std::make_unique<PushSearchOver<M>>(
@@ -119,7 +163,8 @@ void bind_push_searches(nb::module_& module) {
   module.def(
       "grow",
       [](PushTree& tree, const Floats<2>& draws, double bound, double longest,
-         const Floats<1>& scales, const PathProblem& problem, M& model) {
+         const Numbers<3>& scales, const PathProblem& problem, M& model) {
+        require_planted(tree, model);
         const double* s = scales.data();
         const Growth found = grow(tree, rows_as<const GrowthDraw>(draws), bound, longest,
                                   {s[0], s[1], s[2]}, problem, model);
@@ -130,6 +175,10 @@ void bind_push_searches(nb::module_& module) {
   module.def(
       "roll_objects",
       [](M& model, const Poses& start, const Rollouts& rollouts) {
+        const std::size_t count = model.radii().size();
+        require_count("start", start.shape(0), count);
+        require_count("objects", count, rollouts.objects.extent(1));
+        require_indices("ends", rollouts.ends, rollouts.paths.extent(1));
         roll_objects(model, poses(start), rollouts);
       },
       "model"_a, "start"_a.noconvert(), "rollouts"_a, ReleaseGil());
@@ -141,19 +190,25 @@ void bind_push_aware(nb::module_& module) {
           "__init__",
           [](PushTree* self, Index nodes, Index objects, double memory, Index rows, Index columns,
              Index headings, Index signatures) {
-            new (self) PushTree(nodes, objects, memory, {rows, columns, headings, signatures});
+            require_between("nodes", nodes, 1, kMostNodes);
+            require_between("objects", objects, 0, kMostNodes);
+            require_not_negative("memory", memory);
+            require_finite("memory", memory);
+            new (self)
+                PushTree(nodes, objects, memory, cell_shape(rows, columns, headings, signatures));
           },
           "nodes"_a, "objects"_a, "memory"_a, "rows"_a = 1, "columns"_a = 1, "headings"_a = 1,
           "signatures"_a = 1)
       .def(
           "set_cells",
           [](PushTree& self, Index rows, Index columns, Index headings, Index signatures) {
-            self.set_cells({rows, columns, headings, signatures});
+            self.set_cells(cell_shape(rows, columns, headings, signatures));
           },
           "rows"_a, "columns"_a, "headings"_a, "signatures"_a)
       .def(
           "plant",
           [](PushTree& self, const OnePose& root, const Poses& objects, double estimate) {
+            require_count("objects", objects.shape(0), self.objects(0).size());
             self.plant(pose(root), poses(objects), estimate);
           },
           "pose"_a.noconvert(), "objects"_a.noconvert(), "estimate"_a)
@@ -161,10 +216,16 @@ void bind_push_aware(nb::module_& module) {
       .def_ro("full", &PushTree::full)
       .def_ro("driven", &PushTree::driven)
       .def(
-          "cost", [](const PushTree& self, Index node) { return self[node].cost; }, "node"_a)
+          "cost",
+          [](const PushTree& self, Index node) {
+            require_index("node", node, self.count());
+            return self[node].cost;
+          },
+          "node"_a)
       .def(
           "arcs_to",
           [](const PushTree& self, Index node) {
+            require_index("node", node, self.count());
             const std::vector<Arc> arcs = self.arcs_to(node);
             return copied_rows<double>(std::span<const Arc>(arcs));
           },
@@ -176,13 +237,16 @@ void bind_push_aware(nb::module_& module) {
           "The node of the tree in the goal, -1 before it is reached.");
 }
 
+constexpr Index kMostSubsteps = 10'000;
+
 void bind_rollouts(nb::module_& module) {
   nb::class_<RolloutProblem>(module, "RolloutProblem", "Robot, static obstacles and goal.")
       .def(
           "__init__",
-          [](RolloutProblem* self, double period, Index substeps, const Floats<1>& limits,
-             const Footprint& footprint, const ConvexObstacles& walls, const Floats<1>& goal,
+          [](RolloutProblem* self, double period, Index substeps, const Numbers<6>& limits,
+             const Footprint& footprint, const ConvexObstacles& walls, const Numbers<5>& goal,
              bool has_goal, double allowed) {
+            require_between("substeps", substeps, 1, kMostSubsteps);
             new (self) RolloutProblem{
                 period,    substeps, *reinterpret_cast<const DriveLimits*>(limits.data()),
                 footprint, walls,    goal_region(goal),
@@ -197,14 +261,19 @@ void bind_rollouts(nb::module_& module) {
           [](Rollouts* self, const FloatsOut<3>& paths, const FloatsOut<3>& twists,
              const IntegersOut<1>& ends, const IntegersOut<1>& outcomes,
              const FloatsOut<3>& objects, const FloatsOut<1>& works) {
-            new (self) Rollouts{
-                pose_rows(paths),
-                {reinterpret_cast<DriveCommand*>(twists.data()),
-                 {static_cast<Index>(twists.shape(0)), static_cast<Index>(twists.shape(1))}},
-                view(ends),
-                rows_as<RolloutOutcome>(outcomes),
-                pose_rows(objects),
-                view(works)};
+            const std::size_t count = paths.shape(0);
+            require_room("poses of paths", paths.shape(1), 1);
+            require_count("twists", twists.shape(0), count);
+            require_count("ends", ends.shape(0), count);
+            require_count("outcomes", outcomes.shape(0), count);
+            require_count("objects", objects.shape(0), count);
+            require_count("works", works.shape(0), count);
+            new (self) Rollouts{grid_as<Pose>(paths),
+                                grid_as<DriveCommand>(twists),
+                                view(ends),
+                                rows_as<RolloutOutcome>(outcomes),
+                                grid_as<Pose>(objects),
+                                view(works)};
           },
           "paths"_a.noconvert(), "twists"_a.noconvert(), "ends"_a.noconvert(),
           "outcomes"_a.noconvert(), "objects"_a.noconvert(), "works"_a.noconvert(),
@@ -214,9 +283,11 @@ void bind_rollouts(nb::module_& module) {
       "roll_robots",
       [](const Floats<3>& controls, const OnePose& start, double speed, double turn_rate,
          const RolloutProblem& problem, const Rollouts& out) {
-        const ArrayView<const DriveCommand, 2> commands(
-            reinterpret_cast<const DriveCommand*>(controls.data()),
-            {static_cast<Index>(controls.shape(0)), static_cast<Index>(controls.shape(1))});
+        const auto commands = grid_as<const DriveCommand>(controls);
+        require_count("controls", controls.shape(0), out.paths.extent(0));
+        require_count("columns of controls", controls.shape(1), out.twists.extent(1));
+        require_room("poses of paths", static_cast<std::size_t>(out.paths.extent(1)),
+                     controls.shape(1) * static_cast<std::size_t>(problem.substeps) + 1);
         roll_robots(commands, pose(start), {speed, turn_rate}, problem, out);
       },
       "controls"_a.noconvert(), "start"_a.noconvert(), "speed"_a, "turn_rate"_a, "problem"_a,
@@ -226,9 +297,14 @@ void bind_rollouts(nb::module_& module) {
 void bind_ships(nb::module_& module) {
   module.def(
       "propose_change",
-      [](const Poses& path, const Floats<1>& curvatures, const Floats<1>& draws,
-         const Floats<1>& normals, const Floats<1>& problem, const PosesOut& out,
+      [](const Poses& path, const Floats<1>& curvatures, const Numbers<4>& draws,
+         const Numbers<2>& normals, const Numbers<9>& problem, const PosesOut& out,
          const FloatsOut<1>& out_curvatures) {
+        require_count("curvatures", curvatures.shape(0), path.shape(0));
+        require_count("out_curvatures", out_curvatures.shape(0), out.shape(0));
+        for (const double draw : std::span(draws.data(), 4)) {
+          if (!(draw >= 0.0 && draw < 1.0)) refuse("draws", std::to_string(draw), "in [0, 1)");
+        }
         const double* p = problem.data();
         const ChangedPath changed = propose_change(
             {poses(path), view(curvatures)}, *reinterpret_cast<const ChangeDraw*>(draws.data()),
@@ -247,6 +323,8 @@ void bind_ships(nb::module_& module) {
           [](IceCostToGo* self, const FloatsOut<3>& table, const FloatsOut<2>& field, double left,
              double low, double column, double row, double cell, double bow, double mass,
              double weight, double radius) {
+            for (const std::size_t axis : {0, 1, 2}) require_room("table", table.shape(axis), 2);
+            for (const std::size_t axis : {0, 1}) require_room("field", field.shape(axis), 2);
             new (self) IceCostToGo{view(table), view(field), left, low,    column, row,
                                    cell,        bow,         mass, weight, radius};
           },
@@ -257,6 +335,8 @@ void bind_ships(nb::module_& module) {
           "fill_field",
           [](const IceCostToGo& self, const Poses& floes, const Floats<1>& radii,
              const Floats<1>& masses, double half_beam) {
+            require_count("radii", radii.shape(0), floes.shape(0));
+            require_count("masses", masses.shape(0), floes.shape(0));
             self.fill_field({poses(floes), view(radii), view(masses), half_beam});
           },
           "poses"_a.noconvert(), "radii"_a.noconvert(), "masses"_a.noconvert(), "half_beam"_a,
@@ -277,6 +357,7 @@ void bind_ships(nb::module_& module) {
       .def(
           "cost_ahead",
           [](const IceCostToGo& self, const Floats<2>& arc, double step) {
+            require_room("arc", arc.shape(0), 1);
             const CostAhead costs = cost_ahead(self, rows_as<const ArcPose>(arc), step);
             return std::pair(costs.work, costs.to_go);
           },
@@ -285,14 +366,16 @@ void bind_ships(nb::module_& module) {
           "steer_on",
           [](const IceCostToGo& self, const OnePose& start, const Floats<1>& curvatures,
              double step, const FloatsOut<2>& out) {
+            require_room("curvatures", curvatures.shape(0), 1);
             return steer_on(self, pose(start), view(curvatures), step, rows_as<ArcPose>(out));
           },
           "pose"_a.noconvert(), "curvatures"_a.noconvert(), "step"_a, "out"_a.noconvert(),
           ReleaseGil());
   module.def(
       "arc_ahead",
-      [](double goal, const Floats<1>& low, const Floats<1>& high, const OnePose& start,
+      [](double goal, const Numbers<2>& low, const Numbers<2>& high, const OnePose& start,
          double curvature, double step, const FloatsOut<2>& out) {
+        require_room("out", out.shape(0), 1);
         const Box box{low.data()[0], low.data()[1], high.data()[0], high.data()[1]};
         return arc_ahead({goal, box}, pose(start), curvature, step, rows_as<ArcPose>(out));
       },

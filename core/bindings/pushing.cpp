@@ -16,10 +16,12 @@ using namespace pushplan::pushing;
 namespace {
 
 /// A state as Python has it: robot pose, offset, angle, gap.
-using OneState = nb::ndarray<const double, nb::shape<6>, nb::c_contig, nb::device::cpu>;
+using OneState = Numbers<6>;
 using States = nb::ndarray<double, nb::shape<-1, 6>, nb::c_contig, nb::device::cpu>;
 /// Motions of a box as Python has them, the number of the mode fifth.
 using Motions = nb::ndarray<double, nb::shape<-1, 6>, nb::c_contig, nb::device::cpu>;
+
+using Slopes = nb::ndarray<double, nb::shape<2, 4>, nb::c_contig, nb::device::cpu>;
 
 PushState state_of(const OneState& array) {
   return *reinterpret_cast<const PushState*>(array.data());
@@ -72,7 +74,7 @@ void bind_contact(nb::module_& module) {
       .def(
           "velocity",
           [](const BoxContact& self, double offset, double angle, double c, double s, double v,
-             double w, double dt, const FloatsOut<1>& out) {
+             double w, double dt, const NumbersOut<6>& out) {
             const auto [motion, x] = contact_velocity(self, offset, angle, c, s, {v, w}, dt);
             write(motion, out.data());
             return x;
@@ -81,7 +83,7 @@ void bind_contact(nb::module_& module) {
       .def(
           "linearise",
           [](const BoxContact& self, double offset, double angle, double v, double w, double dt,
-             const Floats<1>& widths, const FloatsOut<2>& slopes) {
+             const Numbers<4>& widths, const Slopes& slopes) {
             const double* width = widths.data();
             const BoxSlopes found = linearise(self, offset, angle, {v, w}, dt,
                                               {width[0], width[1], width[2], width[3]});
@@ -94,6 +96,9 @@ void bind_contact(nb::module_& module) {
           "roll_out",
           [](const BoxContact& self, const OneState& start, const Floats<2>& twists,
              const Floats<1>& steps, const States& states, const Motions& motions) {
+            require_count("twists", twists.shape(0), steps.shape(0));
+            require_count("states", states.shape(0), steps.shape(0) + 1);
+            require_count("motions", motions.shape(0), steps.shape(0));
             std::vector<BoxMotion> found(steps.shape(0));
             roll_out(self, state_of(start), rows_as<const Twist>(twists), view(steps),
                      rows_as<PushState>(states), found);
@@ -123,7 +128,10 @@ void bind_clearance(nb::module_& module) {
           "__init__",
           [](Clearance* self, const Points& vertices, const Integers<1>& offsets,
              const Floats<1>& radii, double least, double slack) {
-            new (self) Clearance({points(vertices), view(offsets)}, view(radii), {least, slack});
+            const Polygons parts = polygons(vertices, offsets);
+            require_room("parts", offsets.shape(0), 2);
+            require_count("radii", radii.shape(0), parts.count());
+            new (self) Clearance(parts, view(radii), {least, slack});
           },
           "vertices"_a.noconvert(), "offsets"_a.noconvert(), "radii"_a.noconvert(), "least"_a,
           "slack"_a, nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>())
@@ -163,8 +171,10 @@ void bind_problem(nb::module_& module) {
       .def(
           "__init__",
           [](PushingProblem* self, const BoxContact& contact, const mpc::ReferencePath& track,
-             const PushWeights& weights, const OneState& start, double along, const Floats<1>& last,
-             const Floats<1>& units, const Floats<1>& steps, const Integers<1>& groups) {
+             const PushWeights& weights, const OneState& start, double along,
+             const Numbers<2>& last, const Numbers<2>& units, const Floats<1>& steps,
+             const Integers<1>& groups) {
+            require_count("groups", groups.shape(0), steps.shape(0));
             new (self) PushingProblem{contact,
                                       track,
                                       weights,
@@ -204,6 +214,9 @@ void bind_tracker(nb::module_& module) {
           "__init__",
           [](ListedFaces* self, const Floats<2>& scores, std::vector<BoxContact> contacts,
              const Floats<1>& normals, const Floats<1>& curvatures) {
+            require_count("scores", scores.shape(0), contacts.size());
+            require_count("normals", normals.shape(0), contacts.size());
+            require_count("curvatures", curvatures.shape(0), contacts.size());
             new (self) ListedFaces{std::move(contacts), {}};
             self->faces = {rows_as<const FaceScore>(scores), self->contacts, view(normals),
                            view(curvatures)};

@@ -72,6 +72,17 @@ void without_gil(const auto& call) {
   call();
 }
 
+/// Requires as many poses as there are objects.
+void require_objects(const Poses& poses, const Bodies& bodies) {
+  require_count("poses", poses.shape(0), bodies.radii.size());
+}
+
+/// A path of at least one point.
+std::span<const Vec2> path_of(const Points& path) {
+  require_room("path", path.shape(0), 1);
+  return points(path);
+}
+
 void bind_goal(nb::module_& module) {
   nb::class_<ObjectGoal>(module, "ObjectGoal", "The goal of the objects.")
       .def(
@@ -86,6 +97,7 @@ void bind_goal(nb::module_& module) {
   module.def(
       "all_done",
       [](const Poses& objects, const Bodies& bodies, const ObjectGoal& goal) {
+        require_objects(objects, bodies);
         NewArray<bool, 1> done({extent(objects, 0)});
         without_gil(
             [&] { GoalTest(bodies.objects, goal).all_done(poses(objects), done.numbers()); });
@@ -96,6 +108,10 @@ void bind_goal(nb::module_& module) {
   module.def(
       "cost_to_go",
       [](const Floats<2>& costs, const Integers<1>& delivers, Index objects) {
+        require_between("objects", objects, 0, kMaxExact);
+        require_indices("delivers", view(delivers), Index{1} << objects);
+        require_count("costs", costs.shape(0), delivers.shape(0) + 1);
+        require_count("columns of costs", costs.shape(1), delivers.shape(0));
         const NewArray<double, 2>::Shape shape{Index{1} << objects, extent(costs, 0)};
         NewArray<double, 2> best(shape);
         NewArray<Index, 2> following(shape);
@@ -141,6 +157,8 @@ Numpy<const bool, Rank> shown(ArrayView<const bool, Rank> view, nb::handle owner
   return Numpy<const bool, Rank>(view.data(), Rank, shape.data(), owner);
 }
 
+constexpr Index kMostCells = 30'000;  // of a row or a column
+
 void bind_grid(nb::module_& module) {
   nb::class_<OwnedGrid>(module, "PoseGrid",
                         "A lattice of poses over a static map; cell (i, j) has its middle at "
@@ -149,6 +167,9 @@ void bind_grid(nb::module_& module) {
           "__init__",
           [](OwnedGrid* self, double x, double y, double step, Index rows, Index columns,
              const Footprint& shape, const ConvexObstacles& among) {
+            require_between("rows", rows, 0, kMostCells);
+            require_between("columns", columns, 0, kMostCells);
+            if (!(step > 0.0)) refuse("step", std::to_string(step), "positive");
             CollisionChecker checker(shape, among);
             new (self) OwnedGrid(make_grid({x, y}, step, rows, columns, checker));
           },
@@ -167,8 +188,8 @@ void bind_grid(nb::module_& module) {
           [](nb::handle_t<OwnedGrid> self) {
             return shown(nb::cast<const OwnedGrid&>(self).grid.blocked_moves, self);
           },
-          "(2, 16, rows, columns) from where it is in the way of the move ahead, and of the turn "
-          "to the next heading.")
+          "(2, 16, rows, columns) from where it is in the way of the move ahead, and of the turn to "
+          "the next heading.")
       .def(
           "near_poses",
           [](const OwnedGrid& self, const OnePose& at, double reach) {
@@ -181,6 +202,7 @@ void bind_grid(nb::module_& module) {
           "contact_depths",
           [](const OwnedGrid& self, const Footprint& shape, const Poses& objects,
              const Bodies& bodies) {
+            require_objects(objects, bodies);
             const PoseGrid& grid = self.grid;
             NewArray<float, 4> out({extent(objects, 0), static_cast<Index>(kHeadingCount),
                                     grid.rows(), grid.columns()});
@@ -196,7 +218,17 @@ void bind_grid(nb::module_& module) {
           [](const OwnedGrid& self, const Integers<1>& starts, const Floats<1>& start_costs,
              const Floats<3>& depths, const Floats<3>& touch, double turn_cost, double arm,
              const Integers<1>& targets) {
+            for (const std::size_t axis : {0, 1, 2}) {
+              require_count("depths", depths.shape(axis), self.grid.blocked.extent(axis));
+              require_count("touch", touch.shape(axis), self.grid.blocked.extent(axis));
+            }
             const auto count = static_cast<Index>(depths.size());
+            require_count("start_costs", start_costs.shape(0), starts.shape(0));
+            require_indices("starts", view(starts), count);
+            require_indices("targets", view(targets), count);
+            for (const double cost : view(start_costs)) require_not_negative("start_costs", cost);
+            require_not_negative("turn_cost", turn_cost);
+            require_not_negative("arm", arm);
             NewArray<double, 1> costs({count});
             NewArray<Index, 1> before({count});
             without_gil([&] {
@@ -212,6 +244,7 @@ void bind_grid(nb::module_& module) {
   module.def(
       "add_layers",
       [](const Array<const float, 4>& layers, const Floats<1>& weights) {
+        require_count("weights", weights.shape(0), layers.shape(0));
         const NewArray<double, 3>::Shape shape{extent(layers, 1), extent(layers, 2),
                                                extent(layers, 3)};
         NewArray<double, 3> depth(shape);
@@ -225,6 +258,9 @@ void bind_grid(nb::module_& module) {
       "least_costs",
       [](const Floats<1>& costs, const Integers<1>& nodes, const Floats<1>& extra,
          const Integers<1>& ends) {
+        require_count("extra", extra.shape(0), nodes.shape(0));
+        require_indices("nodes", view(nodes), extent(costs, 0));
+        if (ends.shape(0) > 0) require_offsets("ends", view(ends), nodes.shape(0));
         NewArray<double, 1> out({extent(ends, 0)});
         least_costs(view(costs), {view(nodes), view(extra), view(ends)}, out.numbers());
         return out.give();
@@ -247,13 +283,14 @@ void bind_poses(nb::module_& module) {
       "pushable_moves",
       [](const Floats<3>& middles, const Array<const bool, 2>& is_open, const Floats<1>& shifts,
          double distance, const Footprint& shape, const ConvexObstacles& among) {
+        const auto centres = grid_as<const Vec2>(middles);
+        require_count("rows of is_open", is_open.shape(0), centres.extent(0));
+        require_count("columns of is_open", is_open.shape(1), centres.extent(1));
         NewArray<bool, 3> out(
             {static_cast<Index>(kHeadingCount), extent(middles, 0), extent(middles, 1)});
         without_gil([&] {
           CollisionChecker checker(shape, among);
-          const auto* corners = reinterpret_cast<const Vec2*>(middles.data());
-          pushable_moves({corners, {extent(middles, 0), extent(middles, 1)}}, view(is_open),
-                         view(shifts), distance, checker, out.view());
+          pushable_moves(centres, view(is_open), view(shifts), distance, checker, out.view());
         });
         return out.give();
       },
@@ -267,6 +304,8 @@ void bind_poses(nb::module_& module) {
           [](RouteSearch* self, double step, double turn_cost, double arm, const Footprint& shape,
              const Footprint& tight, const ConvexObstacles& among, const Poses& objects,
              const Bodies& bodies, const Floats<1>& weights) {
+            require_objects(objects, bodies);
+            require_count("weights", weights.shape(0), objects.shape(0));
             new (self) RouteSearch({step, turn_cost, arm}, shape, tight, among,
                                    {poses(objects), bodies.objects, bodies.radii, view(weights)});
           },
@@ -278,6 +317,7 @@ void bind_poses(nb::module_& module) {
           "cheapest_legs",
           [](RouteSearch& self, const Points& line, double heading, double end, Index first,
              Index longest) {
+            require_room("points", line.shape(0), 1);
             const Legs legs = [&] {
               nb::gil_scoped_release released;
               return self.cheapest_legs(points(line), heading, end, first, longest);
@@ -290,6 +330,8 @@ void bind_poses(nb::module_& module) {
           "Costs of ending ahead and back; the row before each row (2 i, 2 i + 1); (2 N, 2) turns "
           "before and after.");
 }
+
+constexpr Index kMostPoses = 10'000'000;  // of the robot
 
 void bind_pushes(nb::module_& module) {
   nb::class_<PushingController>(module, "PushingController",
@@ -323,7 +365,7 @@ void bind_pushes(nb::module_& module) {
           [](const PushingController& self, const OnePose& robot, const OnePose& object,
              const Points& path, double reached, double shift) {
             const PushCommand command =
-                steer_push(pose(robot), pose(object), points(path), reached, shift, self);
+                steer_push(pose(robot), pose(object), path_of(path), reached, shift, self);
             return std::tuple(command.step, command.turn, command.reached, command.holds);
           },
           "robot"_a.noconvert(), "target"_a.noconvert(), "path"_a.noconvert(), "reached"_a,
@@ -332,7 +374,7 @@ void bind_pushes(nb::module_& module) {
   module.def(
       "along_path",
       [](double x, double y, const Points& path, double reached, double ahead) {
-        const Carrot carrot = along_path({x, y}, points(path), reached, ahead);
+        const Carrot carrot = along_path({x, y}, path_of(path), reached, ahead);
         return std::tuple(carrot.point.x, carrot.point.y, carrot.reached, carrot.distance);
       },
       "x"_a, "y"_a, "path"_a.noconvert(), "reached"_a, "ahead"_a,
@@ -356,6 +398,11 @@ void bind_pushes(nb::module_& module) {
              const Points& path, double shift, double limit, const Bools& wanted,
              const PushingController& controller, Index longest) {
             const Index count = extent(objects, 0);
+            require_count("poses", objects.shape(0), self.count());
+            require_count("wanted", wanted.shape(0), self.count());
+            require_between("target", target, -1, count - 1);
+            if (target >= 0) require_room("path", path.shape(0), 1);
+            require_between("longest", longest, 1, kMostPoses);
             NewArray<double, 2> track({longest, 3});
             NewArray<Index, 1> steps({kStages});
             NewArray<double, 3> stages({kStages, count, 3});
@@ -386,6 +433,9 @@ void bind_pushes(nb::module_& module) {
       [](QuasiStatic& model, const OnePose& start, const Poses& objects, const Floats<2>& arcs,
          Index steps, Index target, double size, double least) {
         const Index count = extent(objects, 0);
+        require_objects(objects, model.bodies());
+        require_index("target", target, count);
+        require_between("steps", steps, 0, kMostPoses);
         NewArray<double, 3> tracks({extent(arcs, 0), steps + 1, 3});
         NewArray<double, 4> out({extent(arcs, 0), steps + 1, count, 3});
         ArcSweep sweep{{tracks.as<Pose>(), {extent(arcs, 0), steps + 1}},

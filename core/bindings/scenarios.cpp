@@ -12,15 +12,15 @@ using namespace nb::literals;
 
 namespace {
 
-/// (K, N, 2) numbers as K rows of N points.
-template <class Point, class Numbers>
-ArrayView<Point, 2> corner_rows(const Numbers& array) {
-  return {reinterpret_cast<Point*>(array.data()),
-          {static_cast<Index>(array.shape(0)), static_cast<Index>(array.shape(1))}};
-}
-
-Outlines outlines(const Floats<3>& corners, const Integers<1>& counts) {
-  return {corner_rows<const Vec2>(corners), view(counts)};
+/// K outlines whose corners fit into a buffer.
+Outlines outlines(const Floats<3>& corners, const Integers<1>& counts, std::size_t count) {
+  require_count("outlines", corners.shape(0), count);
+  require_count("counts", counts.shape(0), count);
+  for (const Index used : view(counts)) {
+    require_between("counts", used, 0, static_cast<Index>(corners.shape(1)));
+    require_between("counts", used, 0, kFloeCorners);
+  }
+  return {grid_as<const Vec2>(corners), view(counts)};
 }
 
 /// Outlines to be filled and returned.
@@ -28,7 +28,7 @@ struct NewOutlines {
   explicit NewOutlines(std::size_t count)
       : corners(zeros<double, 3>({count, kFloeCorners, 2})), counts(zeros<Index, 1>({count})) {}
 
-  OutlinesOut out() const { return {corner_rows<Vec2>(corners), view(counts)}; }
+  OutlinesOut out() const { return {grid_as<Vec2>(corners), view(counts)}; }
   auto arrays() const { return std::tuple(corners, counts); }
 
   NewArray<double, 3> corners;
@@ -41,10 +41,10 @@ void bind_scenarios(nb::module_& module) {
   nb::class_<IceWater>(module, "IceWater", "A rectangle of water with regions to stay off.")
       .def(
           "__init__",
-          [](IceWater* self, const Floats<1>& box, const Points& blocks,
+          [](IceWater* self, const Numbers<4>& box, const Points& blocks,
              const Integers<1>& block_offsets, double gap) {
             const double* b = box.data();
-            new (self) IceWater{b[0], b[1], b[2], b[3], {points(blocks), view(block_offsets)}, gap};
+            new (self) IceWater{b[0], b[1], b[2], b[3], polygons(blocks, block_offsets), gap};
           },
           "box"_a.noconvert(), "blocks"_a.noconvert(), "block_offsets"_a.noconvert(), "gap"_a,
           nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>())
@@ -55,7 +55,13 @@ void bind_scenarios(nb::module_& module) {
       [](const Points& centres, const Floats<1>& radii, const Floats<1>& reaches,
          const Integers<1>& neighbours, const Integers<1>& neighbour_offsets,
          const IceWater& water) {
-        const NewOutlines cells(centres.shape(0));
+        const std::size_t count = centres.shape(0);
+        require_count("radii", radii.shape(0), count);
+        require_count("reaches", reaches.shape(0), count);
+        require_count("neighbour_offsets", neighbour_offsets.shape(0), count + 1);
+        require_offsets("neighbour_offsets", view(neighbour_offsets), neighbours.shape(0));
+        require_indices("neighbours", view(neighbours), static_cast<Index>(count));
+        const NewOutlines cells(count);
         const OutlinesOut out = cells.out();
         {
           nb::gil_scoped_release release;
@@ -75,12 +81,15 @@ void bind_scenarios(nb::module_& module) {
       [](const Floats<3>& shapes, const Integers<1>& shape_counts, const Points& centres,
          const Floats<3>& cells, const Integers<1>& cell_counts, const Floats<1>& targets,
          double stretch) {
-        const NewOutlines floes(centres.shape(0));
+        const std::size_t count = centres.shape(0);
+        require_count("targets", targets.shape(0), count);
+        const NewOutlines floes(count);
+        const Outlines all_shapes = outlines(shapes, shape_counts, count);
+        const Outlines all_cells = outlines(cells, cell_counts, count);
         const OutlinesOut out = floes.out();
         {
           nb::gil_scoped_release release;
-          fit_floes(outlines(shapes, shape_counts), points(centres), outlines(cells, cell_counts),
-                    view(targets), stretch, out);
+          fit_floes(all_shapes, points(centres), all_cells, view(targets), stretch, out);
         }
         return floes.arrays();
       },
@@ -93,6 +102,10 @@ void bind_scenarios(nb::module_& module) {
       "place_discs",
       [](const Floats<1>& radii, const Floats<3>& draws, const Floats<2>& density,
          const IceWater& water) {
+        require_room("radii", radii.shape(0), 1);
+        require_count("draws", draws.shape(0), radii.shape(0));
+        require_count("columns of draws", draws.shape(2), std::size_t{3});
+        require_room("density", density.size(), 1);
         std::vector<Vec2> centres(radii.shape(0));
         {
           nb::gil_scoped_release release;

@@ -1,6 +1,4 @@
-"""
-The compiled core of pushplan (C++, see core/). Arguments are not checked.
-"""
+"""The compiled core of pushplan (C++, see core/)."""
 
 from pushplan._core import (
     control as control,
@@ -19,6 +17,6 @@ from pushplan._core import (
 )
 
 
-SOURCES: str = '996e7cbf3f7c'
+SOURCES: str = '6d628654c6f5'
 
 COMPILER: str = 'GNU 12.2.0'

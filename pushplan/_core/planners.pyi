@@ -28,7 +28,7 @@ class CostToGo:
 
 def mark_free(free: Annotated[NDArray[numpy.bool_], dict(shape=(None, None, None), order='C', device='cpu')], first: int, last: int, x: float, y: float, cell: float, footprint: pushplan._core.motion.Footprint, walls: pushplan._core.motion.ConvexObstacles) -> None: ...
 
-def flood(open: Annotated[NDArray[numpy.bool_], dict(shape=(None, None), order='C', device='cpu', writable=False)], x: float, y: float, cell: float, goal: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], centre: int, lengths: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu')]) -> Annotated[NDArray[numpy.int64], dict(shape=(None,))]: ...
+def flood(open: Annotated[NDArray[numpy.bool_], dict(shape=(None, None), order='C', device='cpu', writable=False)], x: float, y: float, cell: float, goal: Annotated[NDArray[numpy.float64], dict(shape=(5), order='C', device='cpu', writable=False)], centre: int, lengths: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu')]) -> Annotated[NDArray[numpy.int64], dict(shape=(None,))]: ...
 
 class PushTree:
     """A search tree, in memory that is made once."""
@@ -64,7 +64,7 @@ class PushSearch:
 class RolloutProblem:
     """Robot, static obstacles and goal."""
 
-    def __init__(self, period: float, substeps: int, limits: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], footprint: pushplan._core.motion.Footprint, walls: pushplan._core.motion.ConvexObstacles, goal: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], has_goal: bool, allowed: float) -> None: ...
+    def __init__(self, period: float, substeps: int, limits: Annotated[NDArray[numpy.float64], dict(shape=(6), order='C', device='cpu', writable=False)], footprint: pushplan._core.motion.Footprint, walls: pushplan._core.motion.ConvexObstacles, goal: Annotated[NDArray[numpy.float64], dict(shape=(5), order='C', device='cpu', writable=False)], has_goal: bool, allowed: float) -> None: ...
 
 class Rollouts:
     """Rollouts of poses among objects."""
@@ -86,13 +86,13 @@ def push_search(tree: PushTree, table: CostToGo, curvatures: Annotated[NDArray[n
     """
 
 @overload
-def grow(tree: PushTree, draws: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], bound: float, longest: float, scales: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], problem: pushplan._core.motion.PathProblem, model: pushplan._core.interaction.QuasiStatic) -> int: ...
+def grow(tree: PushTree, draws: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], bound: float, longest: float, scales: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], problem: pushplan._core.motion.PathProblem, model: pushplan._core.interaction.QuasiStatic) -> int: ...
 
 @overload
-def grow(tree: PushTree, draws: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], bound: float, longest: float, scales: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], problem: pushplan._core.motion.PathProblem, model: pushplan._core.interaction.IceInteraction) -> int: ...
+def grow(tree: PushTree, draws: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], bound: float, longest: float, scales: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], problem: pushplan._core.motion.PathProblem, model: pushplan._core.interaction.IceInteraction) -> int: ...
 
 @overload
-def grow(tree: PushTree, draws: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], bound: float, longest: float, scales: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], problem: pushplan._core.motion.PathProblem, model: pushplan._core.interaction.CalledInteraction) -> int:
+def grow(tree: PushTree, draws: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], bound: float, longest: float, scales: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], problem: pushplan._core.motion.PathProblem, model: pushplan._core.interaction.CalledInteraction) -> int:
     """A node in the goal; -1: none; -2: memory is full."""
 
 @overload
@@ -104,7 +104,7 @@ def roll_objects(model: pushplan._core.interaction.IceInteraction, start: Annota
 @overload
 def roll_objects(model: pushplan._core.interaction.CalledInteraction, start: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu', writable=False)], rollouts: Rollouts) -> None: ...
 
-def propose_change(poses: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu', writable=False)], curvatures: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], draws: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], normals: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], problem: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu')], out_curvatures: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> list[int]:
+def propose_change(poses: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu', writable=False)], curvatures: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], draws: Annotated[NDArray[numpy.float64], dict(shape=(4), order='C', device='cpu', writable=False)], normals: Annotated[NDArray[numpy.float64], dict(shape=(2), order='C', device='cpu', writable=False)], problem: Annotated[NDArray[numpy.float64], dict(shape=(9), order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu')], out_curvatures: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> list[int]:
     """
     `problem` is radius, spacing, spread, most turn, end fraction, and the goal line.
     """
@@ -126,4 +126,4 @@ class IceCostToGo:
 
     def steer_on(self, pose: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], curvatures: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], step: float, out: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu')]) -> int: ...
 
-def arc_ahead(goal: float, low: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], high: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], pose: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], curvature: float, step: float, out: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu')]) -> int: ...
+def arc_ahead(goal: float, low: Annotated[NDArray[numpy.float64], dict(shape=(2), order='C', device='cpu', writable=False)], high: Annotated[NDArray[numpy.float64], dict(shape=(2), order='C', device='cpu', writable=False)], pose: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], curvature: float, step: float, out: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu')]) -> int: ...

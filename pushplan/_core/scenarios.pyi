@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 class IceWater:
     """A rectangle of water with regions to stay off."""
 
-    def __init__(self, box: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], blocks: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], block_offsets: Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C', device='cpu', writable=False)], gap: float) -> None: ...
+    def __init__(self, box: Annotated[NDArray[numpy.float64], dict(shape=(4), order='C', device='cpu', writable=False)], blocks: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], block_offsets: Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C', device='cpu', writable=False)], gap: float) -> None: ...
 
     @property
     def gap(self) -> float:

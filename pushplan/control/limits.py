@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from pushplan.world import Drive, RobotModel, Twist, World
-from pushplan.world.checks import number
+from pushplan.world.checks import expect, number
 
 try:
     import ruckig
@@ -24,6 +24,9 @@ def clamp_twist(robot: RobotModel, linear: float, angular: float) -> Twist:
         linear: wanted forward speed [m/s].
         angular: wanted turn rate [rad/s].
     """
+    expect("robot", robot, RobotModel)
+    linear = number("linear", linear, finite=False)
+    angular = number("angular", angular, finite=False)
     if robot.drive is Drive.CONSTANT_SPEED:
         linear = robot.max_speed
     linear = min(max(linear, robot.min_speed), robot.max_speed)
@@ -113,7 +116,7 @@ class TwistLimiter:
 
     def __init__(self, robot: RobotModel, jerk_time: float = 0.1) -> None:
         number("jerk_time", jerk_time, low=0.0, open_low=True)
-        self.robot = robot
+        self.robot = expect("robot", robot, RobotModel)
         self._speed = _AxisLimiter(robot.max_acceleration, jerk_time)
         self._turn = _AxisLimiter(robot.max_turn_acceleration, jerk_time)
 

@@ -7,7 +7,7 @@ import math
 from pushplan.control.limits import arc_twist
 from pushplan.control.progress_checker import ProgressChecker, StallChecker, decrease_by
 from pushplan.world import RobotModel, Twist
-from pushplan.world.checks import FloatArray
+from pushplan.world.checks import FloatArray, array, expect
 
 _PATIENCE = 3.0
 """Time that may pass without getting on, in times that a step takes at full speed."""
@@ -25,8 +25,8 @@ class PoseFollower:
     """
 
     def __init__(self, robot: RobotModel, poses: FloatArray, response: float) -> None:
-        self._robot = robot
-        self._poses = poses
+        self._robot = expect("robot", robot, RobotModel)
+        self._poses: FloatArray = array("poses", poses, (None, 3))
         self._response = response
         self._next = 1
         self._stall = StallChecker(robot)

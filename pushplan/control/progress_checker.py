@@ -8,7 +8,7 @@ from copy import copy
 from typing import Generic, TypeVar
 
 from pushplan.world import RobotModel, Twist
-from pushplan.world.checks import FloatArray
+from pushplan.world.checks import FloatArray, expect
 
 _STALL_FRACTION = 0.1
 """A robot that moves less than this fraction of what it was told to is being stopped."""
@@ -92,7 +92,7 @@ class StallChecker:
     """
 
     def __init__(self, robot: RobotModel, patience: float = 0.8) -> None:
-        self._size = robot.circumscribed_radius
+        self._size = expect("robot", robot, RobotModel).circumscribed_radius
         self._patience = patience
         self.reset()
 

@@ -13,7 +13,7 @@ from pushplan.core import geometry, motion
 from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.recovery_path import recovery_path
 from pushplan.world import Drive, Twist, World
-from pushplan.world.checks import FloatArray
+from pushplan.world.checks import FloatArray, expect, number
 
 _WAYS = ((-1.0, 0.0), (-0.5, 1.0), (-0.5, -1.0), (1.0, 0.0), (0.5, 1.0), (0.5, -1.0))
 """Speed and turn rate, as fractions of the greatest, that are tried in turn."""
@@ -52,8 +52,8 @@ class Recovery:
         looks: bool = True,
         searches: bool = True,
     ) -> None:
-        robot = world.robot
-        self._distance = distance
+        robot = expect("world", world, World).robot
+        self._distance = number("distance", distance)
         self._response = response
         self._looks = looks
         self._searches = searches and robot.drive is Drive.DIFFERENTIAL  # it turns on the spot

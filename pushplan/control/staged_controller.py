@@ -13,6 +13,7 @@ from pushplan.control.episode_clock import EpisodeClock
 from pushplan.control.limits import approach_speed, ramp_twist
 from pushplan.control.tracking import Progress
 from pushplan.world import Plan, RobotModel, Stage, Twist, World
+from pushplan.world.checks import expect
 
 _WINDOW = 2.0  # of its progress [circumscribed radii]
 
@@ -48,6 +49,7 @@ class StagedController(ABC):
 
     def reset(self, world: World) -> None:
         """See `pushplan.world.Controller`."""
+        expect("world", world, World)
         self._clock.reset()
         self._forget_stage()
         self._begin()
@@ -58,6 +60,8 @@ class StagedController(ABC):
         Past the end of the plan the robot stops; a constant-speed robot drives on along the last
         heading.
         """
+        expect("world", world, World)
+        expect("plan", plan, Plan)
         return self._clock.command_for(world, lambda _: self._by_stages(world, plan))
 
     def _by_stages(self, world: World, plan: Plan) -> Twist:

@@ -8,6 +8,7 @@ from pushplan.control.limits import clamp_twist
 from pushplan.core import control as core
 from pushplan.motion.collision import footprint, obstacles
 from pushplan.world import Twist, World
+from pushplan.world.checks import expect
 
 _AHEAD = (1.0, 0.5, 0.25, 0.0)
 """Distances straight ahead at which circles are tried [circumscribed radii]."""
@@ -26,7 +27,7 @@ def waiting_twist(world: World) -> Twist:
     Args:
         world: the scene now.
     """
-    robot = world.robot
+    robot = expect("world", world, World).robot
     if robot.can_stop:
         return Twist(0.0, 0.0)
     shape = footprint(robot)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from pushplan.core import geometry as core
+from pushplan.geometry.polygon import corners
 from pushplan.world.checks import FloatArray
 
 
@@ -20,18 +19,14 @@ def convex_penetration(a: FloatArray, b: FloatArray) -> tuple[float, float, floa
         overlap and moving ``b`` by ``depth * n`` just separates them; with depth <= 0 they do not,
         and ``-depth`` is the widest gap along an edge normal (at most their distance).
     """
-    return core.convex_penetration(*_outlines(a, b))
+    return core.convex_penetration(corners("a", a), corners("b", b))
 
 
 def convex_overlap(a: FloatArray, b: FloatArray) -> bool:
     """Return True if two convex counter-clockwise polygons overlap; touching does not count."""
-    return core.convex_overlap(*_outlines(a, b))
+    return core.convex_overlap(corners("a", a), corners("b", b))
 
 
 def convex_distance(a: FloatArray, b: FloatArray) -> float:
     """Distance [m] between two convex counter-clockwise polygons, 0 if they overlap."""
-    return core.convex_distance(*_outlines(a, b))
-
-
-def _outlines(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
-    return np.ascontiguousarray(a, dtype=np.float64), np.ascontiguousarray(b, dtype=np.float64)
+    return core.convex_distance(corners("a", a), corners("b", b))

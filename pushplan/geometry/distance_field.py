@@ -11,12 +11,13 @@ from numpy.typing import ArrayLike
 from scipy import ndimage
 
 from pushplan.core import geometry as core
+from pushplan.errors import short
 from pushplan.geometry.contours import standoff_of
 from pushplan.geometry.grid import Grid, clearance_field
 from pushplan.geometry.regions import outside_area
 from pushplan.geometry.shortest_path import GoalDistances, goal_distances
-from pushplan.world import Goal, StaticMap
-from pushplan.world.checks import FloatArray, array, frozen, number
+from pushplan.world import Goal, InvalidInputError, StaticMap
+from pushplan.world.checks import FloatArray, array, expect, frozen, number
 
 
 def sample_values(
@@ -33,7 +34,17 @@ def sample_values(
     around the point differ by more, or one is not finite, a wall lies between them and the cell
     that holds the point counts alone, or if it has no value the least of the others.
     """
-    return core.sample(np.ascontiguousarray(values), ox, oy, step, x, y)
+    try:
+        field = np.ascontiguousarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InvalidInputError(
+            f"values must be an array of numbers, got {short(values)}"
+        ) from error
+    if field.ndim != 2 or field.size == 0:
+        raise InvalidInputError(f"values must be (rows, columns), not empty, got {field.shape}")
+    side = number("step", step, low=0.0, open_low=True)
+    low = number("ox", ox), number("oy", oy)
+    return core.sample(field, *low, side, number("x", x), number("y", y))
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +68,8 @@ class GeodesicField:
         Where the point's own cell is blocked, `filled` counts. inf where no way leads to the goal.
         """
         o = self.grid.origin
-        return core.sample(self.filled, o[0], o[1], self.grid.resolution, float(x), float(y))
+        at = number("x", x), number("y", y)
+        return core.sample(self.filled, o[0], o[1], self.grid.resolution, *at)
 
     def exact(self, x: float, y: float) -> float:
         """Distance to the goal from one point [m], not interpolated; slower than `sample`."""
@@ -124,6 +136,7 @@ def geodesic_field(
     Raises:
         InvalidInputError: if an argument is out of range or the grid would be too large.
     """
+    expect("static", static, StaticMap)
     step = number("resolution", resolution, low=0.0, open_low=True)
     if bounds is not None:
         box: FloatArray = array("bounds", bounds, (4,))

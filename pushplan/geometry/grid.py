@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -18,6 +18,7 @@ from pushplan.world.checks import (
     BoolArray,
     FloatArray,
     checked_bounds,
+    expect,
     frozen,
     integer,
     number,
@@ -47,7 +48,7 @@ class Grid(ArrayRecord, CheckedFields):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if len(self.shape) != 2:
+        if not isinstance(self.shape, Sequence) or len(self.shape) != 2:
             raise InvalidInputError(f"grid.shape must be (rows, columns), got {self.shape!r}")
         rows, cols = (integer("grid.shape", n, low=1) for n in self.shape)
         if rows * cols > MAX_CELLS:
@@ -94,8 +95,9 @@ def clearance_field(
     obstacle in which the cell lies deepest), inf in a map without obstacles. The bounds of the
     map are no obstacle. It is left undone where ``stopped``, asked every few milliseconds, says so.
     """
+    expect("grid", grid, Grid)
     out = np.empty(grid.shape)
-    shapes = obstacles_of(static)
+    shapes = obstacles_of(expect("static", static, StaticMap))
     piece = 1 + _PIECE // (1 + len(shapes.radii))
     for first in range(0, out.size, piece):
         if stopped():

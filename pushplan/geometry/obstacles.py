@@ -12,8 +12,9 @@ from functools import lru_cache
 import numpy as np
 
 from pushplan.core import geometry as core
+from pushplan.geometry.polygon import corners
 from pushplan.world import StaticMap
-from pushplan.world.checks import FloatArray, frozen
+from pushplan.world.checks import FloatArray, array, frozen, integer, number
 from pushplan.world.outline import flatten, outline_boxes
 
 
@@ -29,4 +30,7 @@ def obstacles_of(static: StaticMap, clearance: float = 0.0) -> core.Obstacles:
 
 def core_distance(x: float, y: float, vertices: FloatArray, first: int, last: int) -> float:
     """Signed distance [m] of a point to the core ``vertices[first:last]``, negative inside."""
-    return core.core_distance(x, y, np.ascontiguousarray(vertices[first:last]))
+    every: FloatArray = array("vertices", vertices, (None, 2))
+    begin = integer("first", first, low=0, high=len(every))
+    core_vertices = corners("vertices[first:last]", every[begin : integer("last", last)])
+    return core.core_distance(number("x", x), number("y", y), core_vertices)

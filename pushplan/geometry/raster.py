@@ -12,13 +12,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pushplan.core import geometry as core
-from pushplan.world.checks import FloatArray
+from pushplan.errors import short
+from pushplan.world import InvalidInputError
+from pushplan.world.checks import FloatArray, expect
+
+_PIXELS = ("uint8", "float32", "float64", "bool", "int32", "int64")
 
 
 def fill_convex(image: NDArray[Any], vertices_px: FloatArray, value: Any) -> None:
     """Set the pixels whose centres are in a convex polygon of corners (N, 2) x, y [px]."""
-    pixels = np.ascontiguousarray(image)
-    corners = np.ascontiguousarray(vertices_px, dtype=np.float64)
-    core.fill_convex(pixels, corners, image.dtype.type(value).item())
+    given = expect("image", image, np.ndarray)
+    if given.ndim != 2 or given.dtype.name not in _PIXELS:
+        raise InvalidInputError(
+            f"image must be (rows, columns) of one of {', '.join(_PIXELS)}, "
+            f"got {given.dtype.name} of shape {given.shape}"
+        )
+    try:
+        pixel = given.dtype.type(value).item()
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InvalidInputError(
+            f"value must fit into a pixel of {given.dtype.name}, got {short(value)}"
+        ) from error
+    try:
+        corners = np.ascontiguousarray(vertices_px, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InvalidInputError(
+            f"vertices_px must be numbers of shape (N, 2), got {short(vertices_px)}"
+        ) from error
+    if corners.ndim != 2 or corners.shape[1] != 2:
+        raise InvalidInputError(f"vertices_px must have shape (N, 2), got {corners.shape}")
+    pixels = np.ascontiguousarray(given)
+    core.fill_convex(pixels, corners, pixel)
     if pixels is not image:
         image[...] = pixels

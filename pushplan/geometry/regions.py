@@ -103,7 +103,7 @@ def region_crossings(regions: core.Regions, edges: FloatArray) -> FloatArray:
         a = np.maximum((along**2).sum(axis=1), 1e-300)
         offset = start - np.array([cx, cy])
         b = (along * offset).sum(axis=1) / a
-        square = b**2 - ((offset**2).sum(axis=1) - radius**2) / a
+        square = b**2 - ((offset**2).sum(axis=1) - radius * radius) / a
         root = np.sqrt(np.maximum(square, 0.0))
         for t in (-b - root, -b + root):
             hit = (square >= 0.0) & (t >= 0.0) & (t <= 1.0)

@@ -29,7 +29,16 @@ from pushplan.geometry.regions import (
     regions_of,
 )
 from pushplan.world import Goal, StaticMap
-from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, array, frozen, number
+from pushplan.world.checks import (
+    ArrayRecord,
+    FloatArray,
+    IntArray,
+    array,
+    boolean,
+    expect,
+    frozen,
+    number,
+)
 
 NO_LEG = -2
 """Node index of a place from which nothing can be seen."""
@@ -244,8 +253,9 @@ def goal_distances(
     Raises:
         InvalidInputError: if the goal is none of these, or the clearance is negative.
     """
+    expect("static", static, StaticMap)
     margin = number("clearance", clearance, low=0.0)
-    return _distances(static, margin, as_target(goal), to_center)
+    return _distances(static, margin, as_target(goal), boolean("to_center", to_center))
 
 
 def leave_inflation(static: StaticMap, clearance: float, point: FloatArray) -> FloatArray | None:

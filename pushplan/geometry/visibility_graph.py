@@ -16,7 +16,7 @@ from pushplan.geometry.obstacles import obstacles_of
 from pushplan.geometry.regions import Target, as_target, outside_area, regions_of
 from pushplan.geometry.shortest_path import Path, ends_on_rims, leave_inflation, with_way_out
 from pushplan.world import Goal, StaticMap
-from pushplan.world.checks import FloatArray, IntArray, array, number
+from pushplan.world.checks import FloatArray, IntArray, array, expect, number
 
 _BUDGET = 20_000  # work of a search between two looks at a stop rule: about a millisecond
 
@@ -39,7 +39,7 @@ class VisibilityGraph:
     """
 
     def __init__(self, static: StaticMap, clearance: float = 0.0) -> None:
-        self.static = static
+        self.static = expect("static", static, StaticMap)
         self.clearance = number("clearance", clearance, low=0.0)
 
     def shortest_path(self, start: ArrayLike, goal: ArrayLike) -> Path:

@@ -72,7 +72,8 @@ def checked_clusters(
     Raises:
         InvalidInputError: if they are no partition of 0 to N - 1; the message names the nodes.
     """
-    if isinstance(clusters, str | bytes) or not hasattr(clusters, "__iter__"):
+    listed = hasattr(clusters, "__iter__") and getattr(clusters, "ndim", 1) > 0
+    if isinstance(clusters, str | bytes) or not listed:
         raise InvalidInputError(f"clusters must be a sequence of node lists, got {clusters!r:.60}")
     found: list[IntArray] = []
     owner = np.full(nodes, -1, dtype=np.int64)

@@ -19,7 +19,7 @@ from pushplan.world.checked_fields import (
     PositiveFraction,
     PositiveInt,
 )
-from pushplan.world.checks import IntArray
+from pushplan.world.checks import IntArray, expect
 
 STILL = 0.03
 """Fraction of a step's motion that a body may be moved without a look at its neighbours."""
@@ -107,7 +107,7 @@ class IceInteraction(CheckedFields):
     def sweep(self, world: World, path: ArrayLike) -> Interaction:
         """Predict the motion of every object; see `InteractionModel.sweep`."""
         robot_path = checked_path(path)
-        poses = world.movables.poses.copy()
+        poses = expect("world", world, World).movables.poses.copy()
         out = np.empty((len(robot_path), len(poses), 3))
         core.IceContacts(self.bodies(world), *self.settings(world)).sweep(robot_path, poses, out)
         return Interaction(out, world.movables.masses)

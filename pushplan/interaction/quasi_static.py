@@ -21,7 +21,7 @@ from pushplan.world.checked_fields import (
     PositiveFraction,
     PositiveInt,
 )
-from pushplan.world.checks import FloatArray, frozen
+from pushplan.world.checks import FloatArray, expect, frozen
 from pushplan.world.outline import flatten, outline_boxes, unflatten
 
 _TOLERANCE = 1e-3  # overlap that counts as resolved [sizes of the thinnest body]
@@ -93,7 +93,7 @@ class QuasiStatic(CheckedFields):
     def sweep(self, world: World, path: ArrayLike) -> Interaction:
         """Predict the motion of every object; see `InteractionModel.sweep`."""
         robot_path = checked_path(path)
-        poses = world.movables.poses.copy()
+        poses = expect("world", world, World).movables.poses.copy()
         out = np.empty((len(robot_path), len(poses), 3))
         jammed = self.compiled(world).sweep(robot_path, poses, out)
         return Interaction(out, world.movables.masses, jammed)

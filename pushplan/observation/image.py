@@ -13,6 +13,7 @@ from pushplan.observation.channels import CHANNELS
 from pushplan.observation.view import View
 from pushplan.world import UnknownNameError, World
 from pushplan.world.checked_fields import CheckedFields, Each, Limits
+from pushplan.world.checks import expect
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ class ImageObservation(CheckedFields):
 
     def view(self, world: World) -> View:
         """Return the view of an image of a world, which says where its pixels are."""
-        x, y, heading = world.robot_pose.tolist()
+        x, y, heading = expect("world", world, World).robot_pose.tolist()
         up = 0.5 * math.pi if self.north_up else heading
         pose = np.array([x + self.shift * math.cos(up), y + self.shift * math.sin(up), up])
         (rows, cols) = self.pixels

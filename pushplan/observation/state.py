@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pushplan.observation.builder import LimitedVector
 from pushplan.world import GoalDisc, GoalLine, World
 from pushplan.world.checked_fields import CheckedFields, NonNegativeInt, PositiveFloat
-from pushplan.world.checks import FloatArray
+from pushplan.world.checks import FloatArray, expect
 from pushplan.world.outline import centroid
 
 _OWN = 6
@@ -43,7 +43,7 @@ class StateObservation(LimitedVector, CheckedFields):
 
     def observe(self, world: World) -> NDArray[np.float32]:
         """The vector."""
-        x, y, theta = world.robot_pose
+        x, y, theta = expect("world", world, World).robot_pose
         c = np.cos(theta)
         s = np.sin(theta)
         to_body = np.array([[c, -s], [s, c]])  # row vectors times this turn into the body frame

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -181,12 +182,22 @@ def grown_outlines(
     return np.stack([first, second], axis=1)[keep], grown_offsets
 
 
+def listed(name: str, outlines: Sequence[Any]) -> Sequence[Any]:
+    """Check that outlines come in a list, a tuple or an array; they themselves are not looked at.
+
+    Raises:
+        InvalidInputError: naming the value otherwise.
+    """
+    a_list = isinstance(outlines, Sequence | np.ndarray) and not isinstance(outlines, str | bytes)
+    if not a_list or (isinstance(outlines, np.ndarray) and outlines.ndim == 0):
+        raise InvalidInputError(f"{name} must be a list of outlines, got {short(outlines)}")
+    return outlines
+
+
 def convex_outlines(name: str, outlines: Sequence[ArrayLike]) -> list[FloatArray]:
     """`convex_outline` of each of many outlines, called ``name`` and its index; much quicker."""
-    if isinstance(outlines, str) or not isinstance(outlines, Sequence | np.ndarray):
-        raise InvalidInputError(f"{name} must be a list of outlines, got {short(outlines)}")
     points: list[FloatArray] = []
-    for i, outline in enumerate(outlines):
+    for i, outline in enumerate(listed(name, outlines)):
         if (
             type(outline) is np.ndarray
             and outline.dtype == np.float64

@@ -14,7 +14,7 @@ from pushplan.errors import InvalidInputError
 from pushplan.world.checked_fields import CheckedFields, Shape
 from pushplan.world.checks import ArrayRecord, FloatArray, array, checked_bounds, frozen
 from pushplan.world.occupancy_grid import occupancy_polygons, occupied_cells
-from pushplan.world.outline import convex_outlines
+from pushplan.world.outline import convex_outlines, listed
 
 CAP_CORNERS = 9
 """Corners of each half circle where a thick segment is turned into a polygon."""
@@ -79,7 +79,12 @@ class StaticMap(ArrayRecord, CheckedFields):
             if len(every) == 0:
                 raise InvalidInputError("a static map without obstacles needs bounds")
             bounds = np.concatenate([every.min(axis=0), every.max(axis=0)])
-        return cls(tuple(polygons), lines, thick, array("static.bounds", bounds, (4,)))
+        return cls(
+            tuple(listed("static.polygons", polygons)),
+            lines,
+            thick,
+            array("static.bounds", bounds, (4,)),
+        )
 
     @classmethod
     def from_occupancy(

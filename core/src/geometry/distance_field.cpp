@@ -43,10 +43,11 @@ void fill_distances(ArrayView<double, 2> out, const Cells& cells, const Nodes& n
 double sample(ArrayView<const double, 2> values, const Cells& cells, Vec2 p) {
   const Index rows = values.extent(0);
   const Index cols = values.extent(1);
+  // of NaN and 0 this order keeps the 0
   double u =
-      std::min(std::max((p.x - cells.origin.x) / cells.step, 0.0), static_cast<double>(cols));
+      std::min(std::max(0.0, (p.x - cells.origin.x) / cells.step), static_cast<double>(cols));
   double v =
-      std::min(std::max((p.y - cells.origin.y) / cells.step, 0.0), static_cast<double>(rows));
+      std::min(std::max(0.0, (p.y - cells.origin.y) / cells.step), static_cast<double>(rows));
   const double own =
       values(std::min(static_cast<Index>(v), rows - 1), std::min(static_cast<Index>(u), cols - 1));
   u = std::max(u - 0.5, 0.0);

@@ -76,8 +76,8 @@ void VisibilitySearch::expand(Index node, double length, double low) {
     const Vec2 half = corners_.halves[k];
     const double ax = std::max(std::abs(mx) - half.x, 0.0);
     const double ay = std::max(std::abs(my) - half.y, 0.0);
-    // farther away than that the goal is too far from its corners
-    const double away = high - bounds_[k];
+    const double away =
+        high - bounds_[k];  // farther than that the goal is too far from its corners
     if (away < 0.0 || ax * ax + ay * ay > away * away) {
       rest = true;
       continue;

@@ -118,7 +118,7 @@ Index sample_arcs(const Pose& start, std::span<const Arc> arcs, double spacing,
     if (std::abs(arc.length) < 1e-8 * spacing) continue;
     const auto steps =
         static_cast<Index>(std::ceil(std::abs(arc.length) / step_along(arc.curvature, spacing)));
-    if (count + steps > out.size()) return -1;
+    if (steps < 1 || steps > out.size() - count) return -1;  // less than 1: NaN, or beyond an Index
     for (Index step = 1; step <= steps; ++step) {
       const double length = arc.length * static_cast<double>(step) / static_cast<double>(steps);
       out.poses[static_cast<std::size_t>(count)] = along_arc(here, {length, arc.curvature});

@@ -49,6 +49,7 @@ class SeenPoses {
     const Index row = kHalf + static_cast<Index>(std::rint((pose.y - start_.y) / side_));
     const Index heading = floor_index(floor_mod(pose.theta, kTurn) / kUnit);
     if (column < 0 || column >= kWidth || row < 0 || row >= kWidth) return -1;
+    if (heading < 0 || heading >= turns_) return -1;  // of NaN
     return (row * kWidth + column) * turns_ + heading;
   }
 

@@ -50,15 +50,17 @@ bool RoomExploration::drive(const Pose& from, const Arc& move, Pose& end) {
   return true;
 }
 
-/// The number of the box of a pose.
+/// The number of the box of a pose, `kNowhere` beyond the last ones.
 Index RoomExploration::box_of(const Pose& pose) const {
   const Pose& start = nodes_.front().pose;
   const Index column =
       boxes_.half + static_cast<Index>(std::rint((pose.x - start.x) / boxes_.side));
   const Index row = boxes_.half + static_cast<Index>(std::rint((pose.y - start.y) / boxes_.side));
+  const Index width = width_of(boxes_);
+  if (column < 0 || column >= width || row < 0 || row >= width) return kNowhere;
   const Index heading =
       floor_mod(floor_index(floor_mod(pose.theta, kTurn) / boxes_.turn), boxes_.headings);
-  return (row * width_of(boxes_) + column) * boxes_.headings + heading;
+  return (row * width + column) * boxes_.headings + heading;
 }
 
 bool RoomExploration::is_away(const Pose& pose) const {
@@ -79,9 +81,9 @@ RoomExploration::Outcome RoomExploration::run(Index upto) {
     for (std::size_t m = 0; m < rules_.moves.size(); ++m) {
       Pose pose;
       if (!drive(here, rules_.moves[m], pose)) continue;
-      bool& seen = seen_[box_of(pose)];
-      if (nodes_.size() == capacity_ || seen) continue;
-      seen = true;
+      const Index box = box_of(pose);
+      if (nodes_.size() == capacity_ || box == kNowhere || seen_[box]) continue;
+      seen_[box] = true;
       const auto found = static_cast<Index>(nodes_.size());
       nodes_.push_back({pose, at, static_cast<Index>(m)});
       if (is_away(pose)) {

@@ -161,7 +161,8 @@ bool touches_block(Vec2 p, double reach, const Polygons& blocks) {
 
 /// Which of `count` cells a fraction falls into.
 Index cell_of(double offset, double size, Index count) {
-  return std::min(count - 1, static_cast<Index>(offset / size * static_cast<double>(count)));
+  const double place = offset / size * static_cast<double>(count);
+  return static_cast<Index>(std::min(std::max(0.0, place), static_cast<double>(count - 1)));
 }
 
 }  // namespace

@@ -31,6 +31,9 @@ class Reach {
  public:
   explicit Reach(const ReachShapes& shapes);
 
+  /// Number of objects.
+  Index count() const { return shapes_.objects.count(); }
+
   /// Marks the objects in reach of the robot, those in motion, and those in reach of either.
   void within(const Pose& robot,
               double reach,  // greatest distance that one of its points moves in the step [m]

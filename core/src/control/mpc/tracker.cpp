@@ -233,8 +233,8 @@ double Tracker::turning_speed() const {
 /// Moves the last solution on by the time that has passed since; NaN past its end.
 void Tracker::shift(double held) {
   horizon_.shift_steps(held);
-  // never from an earlier step to a later
-  for (std::size_t k = 0; k < horizon_.steps.size(); ++k) {
+  for (std::size_t k = 0; k < horizon_.steps.size();
+       ++k) {  // never from an earlier step to a later
     const Index index = horizon_.shifted[k];
     horizon_.nominal[k] = index < horizon_.count()
                               ? horizon_.solution[static_cast<std::size_t>(index)]

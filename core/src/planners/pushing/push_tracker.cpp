@@ -12,8 +12,8 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // angle at which another face is taken to be the pushed one [rad]
 constexpr double kFaceTurned = std::numbers::pi * 50.0 / 180.0;
-// a pose farther than this from the predicted one replaces it [L]
-constexpr double kPoseJump = 0.35;
+constexpr double kPoseJump =
+    0.35;  // a pose farther than this from the predicted one replaces it [L]
 // greatest move of the box's place, back or ahead, from one call to the next [L]
 constexpr double kSearchBack = 0.5;
 constexpr double kSearchAhead = 2.0;

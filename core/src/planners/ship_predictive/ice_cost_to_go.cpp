@@ -32,7 +32,8 @@ struct Between {
 
 /// A place in a field of so many lines, on its edge if it lies beyond.
 Between place_in_field(double at, Index lines) {
-  const double inside = std::min(std::max(at, 0.0), static_cast<double>(lines) - 1.000001);
+  // of NaN and 0 this order keeps the 0, here and below
+  const double inside = std::min(std::max(0.0, at), static_cast<double>(lines) - 1.000001);
   const auto line = static_cast<Index>(inside);
   return {line, inside - static_cast<double>(line)};
 }
@@ -61,7 +62,7 @@ struct TableColumn {
 TableColumn column_of(double at, Index columns) {
   const auto last = static_cast<double>(columns) - 1.0;
   const double beside = std::max(std::max(0.0, -at), at - last);
-  return {place_in_table(std::min(std::max(at, 0.0), last), columns), beside};
+  return {place_in_table(std::min(std::max(0.0, at), last), columns), beside};
 }
 
 /// Bilinear value in one row of a table.
@@ -128,7 +129,7 @@ void IceCostToGo::fill_table() const {
       const double aside = row * std::tan(off) / column;
       const auto turned = [&](double side) {
         const double at = static_cast<double>(h) + side * turns;
-        return place_in_table(std::min(std::max(at, 0.0), last_heading), headings);
+        return place_in_table(std::min(std::max(0.0, at), last_heading), headings);
       };
       const std::array<Between, 3> next_headings{turned(-1.0), turned(0.0), turned(1.0)};
       const double heading = 0.5 * std::numbers::pi + off;
@@ -160,9 +161,9 @@ double IceCostToGo::cost_to_go(const Pose& ship) const {
   // each radian beyond the headings of the table counts like a path beside the channel
   const double steep = std::max(0.0, std::abs(off) - kSteepest);
   const double h =
-      std::min(std::max((off + kSteepest) * last_heading / (2.0 * kSteepest), 0.0), last_heading);
+      std::min(std::max(0.0, (off + kSteepest) * last_heading / (2.0 * kSteepest)), last_heading);
   const double before = std::max(0.0, -r) * row;  // the ship goes straight up to the first row
-  r = std::min(std::max(r, 0.0), last_row);
+  r = std::min(std::max(0.0, r), last_row);
   const Index i = std::min(static_cast<Index>(r), rows - 2);
   const auto [place, beside] = column_of(c, table.extent(1));
   const Between heading = place_in_table(h, table.extent(2));

@@ -67,6 +67,8 @@ class PushTree {
   }
 
   Index count() const { return count_; }
+  /// Number of nodes for which there is memory.
+  Index capacity() const { return capacity_; }
   /// Whether there is room for so many more nodes, and whether for more objects.
   bool has_room(Index nodes) const { return count_ + nodes <= capacity_; }
   bool has_room_for_objects() const { return rows_used_ < rows_; }

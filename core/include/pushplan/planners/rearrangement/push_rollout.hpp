@@ -52,6 +52,9 @@ class PushRollout {
  public:
   PushRollout(const Bodies& bodies, const QuasiStaticSettings& settings, const ObjectGoal& goal);
 
+  /// Number of objects.
+  Index count() const { return static_cast<Index>(poses_.size()); }
+
   /// Pushes until nothing that is wanted can come of it. The last stage is kept however it ends.
   RolloutSize run(const Pose& start, std::span<const Pose> poses, const PushAttempt& attempt,
                   const PushingController& controller, const RolloutLog& log);
