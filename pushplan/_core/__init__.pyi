@@ -17,6 +17,6 @@ from pushplan._core import (
 )
 
 
-SOURCES: str = '6d628654c6f5'
+SOURCES: str = '31f9a8d98a3e'
 
 COMPILER: str = 'GNU 12.2.0'
