@@ -262,7 +262,9 @@ void bind_lattice(nb::module_& module) {
           [](const PoseLattice& self, Index node, const IntegersOut<1>& nodes,
              const FloatsOut<1>& costs, const IntegersOut<1>& edges) {
             require_node(self, node);
-            const auto most = static_cast<std::size_t>(self.ends.size());
+            const auto heading = static_cast<std::size_t>(self.place_of(node).heading);
+            const auto most =
+                static_cast<std::size_t>(self.first[heading + 1] - self.first[heading]);
             require_room("nodes", nodes.shape(0), most);
             require_room("costs", costs.shape(0), most);
             require_room("edges", edges.shape(0), most);
