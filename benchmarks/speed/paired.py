@@ -1,6 +1,6 @@
 """Times of two trees of pushplan against each other, in turns, and if their results are the same.
 
-    python -m benchmarks.speed.paired --old CHECKOUT [--old-python PYTHON] [--only TEXT]
+    python -m benchmarks.speed.paired --old CHECKOUT [--old-python PYTHON] [--only PATTERN]
 
 Two processes, of this tree and of an older one, do the same work one after the other, first the
 one and then the other. Times are processor time of the process; work and its results are those of
@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from argparse import Namespace
@@ -173,7 +174,7 @@ def options() -> Namespace:
     parser.add_argument("--old", type=Path, required=True, help="top folder of the older tree")
     parser.add_argument("--old-python", help="interpreter for which the older tree is installed")
     parser.add_argument("--repeats", type=int, default=16, help="pairs; default 16")
-    parser.add_argument("--only", default="", help="workloads whose names hold this text")
+    parser.add_argument("--only", default="", help="workloads whose names match this expression")
     return parser.parse_args()
 
 
@@ -181,7 +182,7 @@ def main() -> None:
     """Print the table."""
     given = options()
     tree = Path(__file__).parents[2]
-    workloads = [name for name in paired_worker.WORKLOADS if given.only in name]
+    workloads = [name for name in paired_worker.WORKLOADS if re.search(given.only, name)]
     with (
         side("old", given.old.resolve(), given.old_python, given.old_python is not None) as old,
         side("new", tree, None, True) as new,
