@@ -93,7 +93,7 @@ struct PoseLattice {
                                            // to the line [m]
   ArrayView<const double, 2> place_costs;  // (rows, columns) bound or estimate of the cost from
                                            // each place to the line [m]
-  double inflation;  // factor on both
+  double inflation;                        // factor on both
 
   struct Place {
     Index heading;
