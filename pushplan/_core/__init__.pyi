@@ -17,6 +17,6 @@ from pushplan._core import (
 )
 
 
-SOURCES: str = '31f9a8d98a3e'
+SOURCES: str = '21b38b23cb22'
 
 COMPILER: str = 'GNU 12.2.0'
