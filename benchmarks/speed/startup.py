@@ -10,6 +10,7 @@ memory that the process had. The world is a start of a suite of the policy's tas
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -61,10 +62,13 @@ def measure(policy: str, seed: int) -> np.ndarray:
         path = Path(folder, "world.json")
         save_world(env.world, path)
         command = [sys.executable, "-c", _SCRIPT, policy, str(path)]
-        for _ in range(_PROCESSES):
-            done = subprocess.run(command, capture_output=True, text=True, check=True)
+        environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": ""}  # as pip leaves a package
+        for _ in range(1 + _PROCESSES):
+            done = subprocess.run(
+                command, env=environment, capture_output=True, text=True, check=True
+            )
             found.append(json.loads(done.stdout))
-    return np.median(found, axis=0)
+    return np.median(found[1:], axis=0)
 
 
 def main() -> None:

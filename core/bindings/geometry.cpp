@@ -322,6 +322,17 @@ void bind_visibility(nb::module_& module) {
       },
       "first"_a.noconvert(), "second"_a.noconvert());
   module.def(
+      "find_nearest_marked",
+      [](const Array<const bool, 2>& marked, const IntegersOut<2>& rows,
+         const IntegersOut<2>& cols) {
+        for (const auto& out : {rows, cols}) {
+          require_count("rows of the output", out.shape(0), marked.shape(0));
+          require_count("columns of the output", out.shape(1), marked.shape(1));
+        }
+        find_nearest_marked(view(marked), view(rows), view(cols));
+      },
+      "marked"_a.noconvert(), "rows"_a.noconvert(), "cols"_a.noconvert(), ReleaseGil());
+  module.def(
       "sample",
       [](const Floats<2>& values, double ox, double oy, double step, double x, double y) {
         return sample(field(values), {{ox, oy}, step}, {x, y});

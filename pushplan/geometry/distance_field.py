@@ -8,12 +8,11 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import ndimage
 
 from pushplan.core import geometry as core
 from pushplan.errors import short
 from pushplan.geometry.contours import standoff_of
-from pushplan.geometry.grid import Grid, clearance_field
+from pushplan.geometry.grid import Grid, clearance_field, nearest_marked
 from pushplan.geometry.regions import outside_area
 from pushplan.geometry.shortest_path import GoalDistances, goal_distances
 from pushplan.world import Goal, InvalidInputError, StaticMap
@@ -92,7 +91,7 @@ class GeodesicField:
         fill = (blocked | outside) & ~reached
         if not reached.any() or not fill.any():
             return self.values
-        away, (rows, cols) = ndimage.distance_transform_edt(~reached, return_indices=True)
+        away, rows, cols = nearest_marked(reached)
         offered = self.values[rows, cols] + away * grid.resolution
         return frozen(np.where(fill, offered, self.values))
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import ndimage
 
 from pushplan.geometry.grid import Grid, clearance_field
 from pushplan.world import Movables, NavigationGoal, StaticMap
@@ -30,6 +29,8 @@ class FreeComponents(ArrayRecord):
     @classmethod
     def of(cls, grid: Grid, clearance: FloatArray, radius: float) -> FreeComponents:
         """The components for a disc of ``radius`` [m]; cells are connected along their sides."""
+        from scipy import ndimage  # takes longer to import than all planners
+
         labels = ndimage.label(clearance > radius)[0].astype(np.int64)
         return cls(grid, clearance, labels)
 

@@ -14,11 +14,10 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from pushplan.core import geometry as core
 from pushplan.geometry.contours import Contours, contours_of, gap_of, standoff_of
-from pushplan.geometry.grid import Grid, occupancy
+from pushplan.geometry.grid import Grid, nearest_marked, occupancy
 from pushplan.geometry.obstacles import obstacles_of
 from pushplan.geometry.shortest_path import bends_of
 from pushplan.world import StaticMap
@@ -81,8 +80,6 @@ def bend_distances(
     if count:
         blocked = occupancy(static, grid, 2.0 * standoff_of(static, 0.0))
         if blocked.any() and not blocked.all():
-            rows, cols = ndimage.distance_transform_edt(
-                blocked, return_distances=False, return_indices=True
-            )
+            _, rows, cols = nearest_marked(~blocked)
             table[blocked] = table[rows[blocked], cols[blocked]]
     return BendDistances(static, grid, frozen(table), bends, contours.corners, offsets)

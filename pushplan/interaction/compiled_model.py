@@ -11,7 +11,6 @@ from collections.abc import Callable
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from scipy import LowLevelCallable
 
 from pushplan.core import interaction as core
 from pushplan.errors import InvalidInputError, short
@@ -127,6 +126,8 @@ def _array(numbers: Any, shape: tuple[int, ...]) -> FloatArray:
 
 def _addresses(function: Any) -> tuple[int, int]:
     """Addresses of a C function, and of its user data or 0."""
+    from scipy import LowLevelCallable
+
     if isinstance(function, LowLevelCallable):
         capsule = ctypes.py_object(tuple.__getitem__(function, 0))
         name = _capsule_reader("Name", ctypes.c_char_p)(capsule)

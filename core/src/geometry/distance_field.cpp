@@ -2,12 +2,51 @@
 
 #include <algorithm>
 #include <limits>
+#include <vector>
 
 namespace pushplan {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kSteepest = 1.5;  // difference of four neighbouring cells without a wall [steps]
+
+/// A marked cell seen from a line of cells.
+struct Seen {
+  Index along;   // cell of the line that is nearest to it
+  Index square;  // of its distance to that one [cells²]
+  Index row;
+
+  Index square_from(Index at) const { return square + (at - along) * (at - along); }
+};
+
+/// Appends one that lies further along the line, and drops those that no cell of the line is
+/// nearest to any more.
+void append_seen(std::vector<Seen>& line, const Seen& next) {
+  while (line.size() >= 2) {
+    const Seen& first = line[line.size() - 2];
+    const Seen& middle = line.back();
+    const Index a = middle.along - first.along;
+    const Index b = next.along - middle.along;
+    const Index hidden =
+        (a + b) * middle.square - b * first.square - a * next.square - a * b * (a + b);
+    if (hidden <= 0) break;
+    line.pop_back();
+  }
+  line.push_back(next);
+}
+
+/// Calls `write` with each cell of a line and the one seen that is nearest to it.
+template <class Write>
+void visit_nearest(const std::vector<Seen>& line, Index length, Write write) {
+  if (line.empty()) return;
+  std::size_t best = 0;
+  for (Index at = 0; at < length; ++at) {
+    while (best + 1 < line.size() && line[best + 1].square_from(at) < line[best].square_from(at)) {
+      ++best;
+    }
+    write(at, line[best]);
+  }
+}
 
 }  // namespace
 
@@ -73,6 +112,31 @@ double sample(ArrayView<const double, 2> values, const Cells& cells, Vec2 p) {
 void sample(ArrayView<const double, 2> values, const Cells& cells, std::span<const Vec2> points,
             std::span<double> out) {
   for (std::size_t n = 0; n < points.size(); ++n) out[n] = sample(values, cells, points[n]);
+}
+
+void find_nearest_marked(ArrayView<const bool, 2> marked, ArrayView<Index, 2> rows,
+                         ArrayView<Index, 2> cols) {
+  std::fill_n(rows.data(), rows.size(), Index{-1});
+  std::fill_n(cols.data(), cols.size(), Index{-1});
+  std::vector<Seen> line;
+  for (Index j = 0; j < marked.extent(1); ++j) {
+    line.clear();
+    for (Index i = 0; i < marked.extent(0); ++i) {
+      if (marked(i, j)) line.push_back({i, 0, i});
+    }
+    visit_nearest(line, marked.extent(0), [&](Index i, const Seen& seen) { rows(i, j) = seen.row; });
+  }
+  for (Index i = 0; i < marked.extent(0); ++i) {
+    line.clear();
+    for (Index j = 0; j < marked.extent(1); ++j) {
+      const Index row = rows(i, j);
+      if (row >= 0) append_seen(line, {j, (row - i) * (row - i), row});
+    }
+    visit_nearest(line, marked.extent(1), [&](Index j, const Seen& seen) {
+      rows(i, j) = seen.row;
+      cols(i, j) = seen.along;
+    });
+  }
 }
 
 }  // namespace pushplan

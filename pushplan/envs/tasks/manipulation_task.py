@@ -9,13 +9,13 @@ from functools import lru_cache
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
-from scipy import ndimage
 
 from pushplan.envs.tasks.base import StepOutcome, Task
 from pushplan.envs.tasks.layout import GAP, FreeSpace, footprint_at, goal_distances, place_boxes
 from pushplan.envs.tasks.variations import TaskVariations, Yaw
 from pushplan.geometry import GeodesicField, Grid, clearance_field, geodesic_field
 from pushplan.geometry.free_components import FreeComponents
+from pushplan.geometry.grid import nearest_marked
 from pushplan.observation import ImageObservation
 from pushplan.world import (
     BUMPERS,
@@ -93,7 +93,7 @@ class Reach:
         wanted = labels[tuple(nearest[:, row, col])][0]
         if wanted == 0:  # the robot fits nowhere
             return cls(grid, np.full(grid.shape, np.inf))
-        return cls(grid, ndimage.distance_transform_edt(labels != wanted) * resolution)
+        return cls(grid, nearest_marked(labels == wanted)[0] * resolution)
 
     def within(self, points: FloatArray, distance: float) -> BoolArray:
         """Check which points (N, 2) [m] are at most ``distance`` [m] from where the robot fits."""
@@ -106,10 +106,8 @@ def _components(static: StaticMap, radius: float, resolution: float) -> tuple[Gr
     """The grid, the number of each cell's free component (0: none), the nearest free cell."""
     grid = Grid.cover(static.bounds, resolution)
     labels = FreeComponents.of(grid, clearance_field(static, grid), radius).labels
-    nearest = ndimage.distance_transform_edt(
-        labels == 0, return_distances=False, return_indices=True
-    )
-    return grid, labels, nearest
+    _, *nearest = nearest_marked(labels != 0)
+    return grid, labels, np.stack(nearest)
 
 
 def _cells(grid: Grid, points: FloatArray) -> tuple[IntArray, IntArray]:

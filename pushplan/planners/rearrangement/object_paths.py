@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 import shapely
-from scipy.ndimage import distance_transform_edt, map_coordinates
+from scipy.ndimage import map_coordinates
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from pushplan.core import rearrangement as core
 from pushplan.geometry import GoalDistances, goal_distances
+from pushplan.geometry.grid import nearest_marked
 from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.done_places import done_places
 from pushplan.planners.rearrangement.rearrangement_config import SHIFTS
@@ -174,7 +175,7 @@ class PushCostToGo:
             obstacles(static),
         )
         costs = self._search(open_cells, pushable, _is_goal(goal, radius, middles, self._step))
-        away, (i, j) = distance_transform_edt(~np.isfinite(costs), return_indices=True)
+        away, i, j = nearest_marked(np.isfinite(costs))
         self._costs: FloatArray = costs[i, j] + self._drag_cost * self._step * away
 
     def _search(self, is_open: BoolArray, pushable: BoolArray, goal: BoolArray) -> FloatArray:

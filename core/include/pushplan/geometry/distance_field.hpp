@@ -43,4 +43,12 @@ double sample(ArrayView<const double, 2> values, const Cells& cells, Vec2 p);
 void sample(ArrayView<const double, 2> values, const Cells& cells, std::span<const Vec2> points,
             std::span<double> out);
 
+/// Writes row and column of the marked cell nearest to each cell; -1 where none is marked.
+///
+/// Maurer, Qi, Raghavan, "A linear time algorithm for computing exact Euclidean distance transforms
+/// of binary images in arbitrary dimensions", 2003. Of two equally near the first along the row
+/// counts, then the first along the column.
+void find_nearest_marked(ArrayView<const bool, 2> marked, ArrayView<Index, 2> rows,
+                         ArrayView<Index, 2> cols);
+
 }  // namespace pushplan
