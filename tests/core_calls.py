@@ -325,6 +325,8 @@ VALID: dict[str, Any] = {
     "rearrangement.least_costs.ends": [1, 2],
     "rearrangement.pushable_moves.middles": np.zeros((3, 3, 2)),
     "rearrangement.pushable_moves.is_open": np.ones((3, 3)),
+    "rearrangement.push_costs.is_open": np.ones((3, 3)),
+    "rearrangement.push_costs.pushable": np.ones((16, 3, 3)),
     "rearrangement.PushingController.steer_push.path": SQUARE,
     "rearrangement.along_path.path": SQUARE,
     "rearrangement.PushRollout.run.path": SQUARE,

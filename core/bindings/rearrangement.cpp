@@ -297,6 +297,25 @@ void bind_poses(nb::module_& module) {
       "middles"_a.noconvert(), "is_open"_a.noconvert(), "shifts"_a.noconvert(), "distance"_a,
       "shape"_a, "among"_a, kOwned,
       "(16, rows, columns) whether the robot fits behind an object to push it along each heading.");
+  module.def(
+      "push_costs",
+      [](const Array<const bool, 2>& is_open, const Array<const bool, 3>& pushable,
+         const Integers<1>& goals, double step, double drag_cost) {
+        require_count("headings of pushable", pushable.shape(0), kHeadingCount);
+        require_count("rows of pushable", pushable.shape(1), is_open.shape(0));
+        require_count("columns of pushable", pushable.shape(2), is_open.shape(1));
+        require_not_negative("step", step);
+        require_not_negative("drag_cost", drag_cost);
+        NewArray<double, 2> out({extent(is_open, 0), extent(is_open, 1)});
+        require_indices("goals", view(goals), out.view().size());
+        without_gil([&] {
+          fill_push_costs(view(is_open), view(pushable), view(goals), step, drag_cost, out.view());
+        });
+        return out.give();
+      },
+      "is_open"_a.noconvert(), "pushable"_a.noconvert(), "goals"_a.noconvert(), "step"_a,
+      "drag_cost"_a, kOwned,
+      "(rows, columns) cost of the cheapest path of an object from each cell to a goal [m].");
   nb::class_<RouteSearch>(module, "RouteSearch",
                           "Costs of motions among objects and walls, with memory for one thread.")
       .def(

@@ -17,6 +17,6 @@ from pushplan._core import (
 )
 
 
-SOURCES: str = '21b38b23cb22'
+SOURCES: str = '4d2630027080'
 
 COMPILER: str = 'GNU 12.2.0'

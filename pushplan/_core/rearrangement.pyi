@@ -84,6 +84,11 @@ def pushable_moves(middles: Annotated[NDArray[numpy.float64], dict(shape=(None, 
     (16, rows, columns) whether the robot fits behind an object to push it along each heading.
     """
 
+def push_costs(is_open: Annotated[NDArray[numpy.bool_], dict(shape=(None, None), order='C', device='cpu', writable=False)], pushable: Annotated[NDArray[numpy.bool_], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], goals: Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C', device='cpu', writable=False)], step: float, drag_cost: float) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None))]:
+    """
+    (rows, columns) cost of the cheapest path of an object from each cell to a goal [m].
+    """
+
 class RouteSearch:
     """Costs of motions among objects and walls, with memory for one thread."""
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.spatial.distance import cdist
 
 from pushplan.world.checks import FloatArray, choice, integer
 
@@ -19,6 +18,17 @@ TSPLIB_PI = 3.141592
 def _nearest(values: FloatArray) -> FloatArray:
     result: FloatArray = np.floor(values + 0.5)
     return result
+
+
+def _straight(at: FloatArray, others: FloatArray) -> FloatArray:
+    x, y = _offsets(at, others)
+    result: FloatArray = np.sqrt(x * x + y * y)
+    return result
+
+
+def _offsets(at: FloatArray, others: FloatArray) -> FloatArray:
+    """(2, R, N) from the others."""
+    return at.T[:, :, None] - others.T[:, None]
 
 
 def _geo(at: FloatArray, others: FloatArray) -> FloatArray:
@@ -40,12 +50,12 @@ def _radians(at: FloatArray) -> FloatArray:
 
 
 _RULES: dict[str, Callable[[FloatArray, FloatArray], FloatArray]] = {
-    "ATT": lambda at, others: np.ceil(np.sqrt(cdist(at, others, "sqeuclidean") / 10.0)),
-    "CEIL_2D": lambda at, others: np.ceil(cdist(at, others)),
-    "EUC_2D": lambda at, others: _nearest(cdist(at, others)),
+    "ATT": lambda at, others: np.ceil(np.sqrt((_offsets(at, others) ** 2).sum(axis=0) / 10.0)),
+    "CEIL_2D": lambda at, others: np.ceil(_straight(at, others)),
+    "EUC_2D": lambda at, others: _nearest(_straight(at, others)),
     "GEO": _geo,
-    "MAN_2D": lambda at, others: _nearest(cdist(at, others, "cityblock")),
-    "MAX_2D": lambda at, others: _nearest(cdist(at, others, "chebyshev")),
+    "MAN_2D": lambda at, others: _nearest(np.abs(_offsets(at, others)).sum(axis=0)),
+    "MAX_2D": lambda at, others: _nearest(np.abs(_offsets(at, others)).max(axis=0)),
 }
 """Rules for the distances (R, N) from some points to all."""
 COORDINATE_TYPES = tuple(sorted(_RULES))

@@ -5,8 +5,10 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import ndimage
 
 from pushplan.geometry import Grid, clearance_field, fill_convex, occupancy
+from pushplan.geometry.grid import nearest_marked
 from pushplan.world import InvalidInputError, StaticMap
 
 
@@ -86,3 +88,18 @@ def test_empty_map_is_free_everywhere() -> None:
     grid = Grid.cover(static.bounds, 0.5)
     assert np.isinf(clearance_field(static, grid)).all()
     assert not occupancy(static, grid).any()
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_the_nearest_marked_cells_are_those_of_scipy(seed):
+    rng = np.random.default_rng(seed)
+    marked = rng.random(rng.integers(1, 40, 2)) < rng.choice([0.01, 0.1, 0.5, 0.9])
+    marked.ravel()[rng.integers(marked.size)] = True
+    away, (rows, cols) = ndimage.distance_transform_edt(~marked, return_indices=True)
+    for found, wanted in zip(nearest_marked(marked), (away, rows, cols), strict=True):
+        np.testing.assert_array_equal(found, wanted)
+
+
+def test_no_cell_is_nearest_where_none_is_marked():
+    _, rows, cols = nearest_marked(np.zeros((3, 4), dtype=bool))
+    assert (rows == -1).all() and (cols == -1).all()

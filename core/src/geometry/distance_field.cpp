@@ -124,7 +124,8 @@ void find_nearest_marked(ArrayView<const bool, 2> marked, ArrayView<Index, 2> ro
     for (Index i = 0; i < marked.extent(0); ++i) {
       if (marked(i, j)) line.push_back({i, 0, i});
     }
-    visit_nearest(line, marked.extent(0), [&](Index i, const Seen& seen) { rows(i, j) = seen.row; });
+    visit_nearest(line, marked.extent(0),
+                  [&](Index i, const Seen& seen) { rows(i, j) = seen.row; });
   }
   for (Index i = 0; i < marked.extent(0); ++i) {
     line.clear();

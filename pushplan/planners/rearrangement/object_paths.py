@@ -9,9 +9,6 @@ from typing import Any
 
 import numpy as np
 import shapely
-from scipy.ndimage import map_coordinates
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra
 
 from pushplan.core import rearrangement as core
 from pushplan.geometry import GoalDistances, goal_distances
@@ -20,19 +17,8 @@ from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.done_places import done_places
 from pushplan.planners.rearrangement.rearrangement_config import SHIFTS
 from pushplan.world import ClearanceArea, Goal, Receptacle, RobotModel, StaticMap
-from pushplan.world.checks import BoolArray, FloatArray, IntArray
+from pushplan.world.checks import BoolArray, FloatArray
 
-_QUARTER = ((1, 0), (2, 1), (1, 1), (1, 2))
-MOVES: IntArray = np.array(
-    [*_QUARTER]
-    + [(-y, x) for x, y in _QUARTER]
-    + [(-x, -y) for x, y in _QUARTER]
-    + [(y, -x) for x, y in _QUARTER],
-    dtype=np.int64,
-)
-"""(16, 2) cells along x and y that a straight move along each heading crosses, as in the core."""
-LENGTHS: FloatArray = np.hypot(MOVES[:, 0], MOVES[:, 1])
-"""(16,) length of the move along each heading [cells]."""
 _INSET = 1.05  # distance of an object from the edges of a receptacle when it is done [radii]
 _MOST_KEPT = 20_000  # greatest number of lengths and paths that are kept
 _CELL = 0.125  # side of a cell [circumscribed radii of the robot]
@@ -151,7 +137,6 @@ class PushCostToGo:
         margin: float,
         drag_cost: float = _DRAG_COST,
     ) -> None:
-        self._drag_cost = drag_cost
         low = static.bounds[:2]
         high = static.bounds[2:]
         sides = high - low
@@ -174,30 +159,13 @@ class PushCostToGo:
             footprint(robot, margin),
             obstacles(static),
         )
-        costs = self._search(open_cells, pushable, _is_goal(goal, radius, middles, self._step))
+        at_goal = open_cells & _is_goal(goal, radius, middles, self._step)
+        costs = np.zeros((rows, cols))
+        if at_goal.any():
+            seeds = np.flatnonzero(at_goal)
+            costs = core.push_costs(open_cells, pushable, seeds, self._step, drag_cost)
         away, i, j = nearest_marked(np.isfinite(costs))
-        self._costs: FloatArray = costs[i, j] + self._drag_cost * self._step * away
-
-    def _search(self, is_open: BoolArray, pushable: BoolArray, goal: BoolArray) -> FloatArray:
-        """(rows, cols) cost of the path from each cell [m]."""
-        rows, cols = is_open.shape
-        i, j = np.nonzero(is_open)
-        # (16, cells)
-        a = i + MOVES[:, 1:]
-        b = j + MOVES[:, :1]
-        leads_on = (0 <= a) & (a < rows) & (0 <= b) & (b < cols)
-        leads_on[leads_on] = is_open[a[leads_on], b[leads_on]]
-        t, at = np.nonzero(leads_on)
-        lengths = LENGTHS[t] * self._step
-        costs = np.where(pushable[t, i[at], j[at]], lengths, self._drag_cost * lengths)
-        # backward: from the goal against the moves
-        where = (a * cols + b)[leads_on], (i * cols + j)[at]
-        graph = csr_array((costs, where), shape=(rows * cols, rows * cols))
-        seeds = np.flatnonzero(goal & is_open)
-        if not len(seeds):
-            return np.zeros((rows, cols))
-        out: FloatArray = dijkstra(graph, indices=seeds, min_only=True).reshape(rows, cols)
-        return out
+        self._costs: FloatArray = costs[i, j] + drag_cost * self._step * away
 
     def at(self, pose: FloatArray) -> float:
         """Cost from a pose (3,) of the object [m]."""
@@ -206,10 +174,15 @@ class PushCostToGo:
     def along(self, poses: FloatArray) -> FloatArray:
         """(N,) cost from poses (N, 3) of the object [m]."""
         cells = (poses[:, :2] - self._low) / self._step
-        out: FloatArray = map_coordinates(
-            self._costs, cells[:, ::-1].T, order=1, mode="nearest", prefilter=False
-        )
-        return out
+        low = np.floor(cells)
+        last = np.array(self._costs.shape)[::-1] - 1  # beyond the map the nearest cells count
+        j, i = np.clip(low, 0, last).astype(np.int64).T
+        b, a = np.clip(low + 1, 0, last).astype(np.int64).T
+        x, y = (cells - low).T
+        costs: FloatArray = self._costs[i, j] * (1 - y) * (1 - x) + self._costs[i, b] * (1 - y) * x
+        costs += self._costs[a, j] * y * (1 - x)
+        costs += self._costs[a, b] * y * x
+        return costs
 
 
 def _is_goal(goal: Goal, radius: float, middles: Any, step: float) -> BoolArray:

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 import shapely
 from conftest import SQUARE, make_boxes
+from scipy.sparse import dok_array
+from scipy.sparse.csgraph import dijkstra
 
 from pushplan.control import PoseFollower
 from pushplan.core import rearrangement as core
@@ -22,7 +24,6 @@ from pushplan.planners.rearrangement import (
 )
 from pushplan.planners.rearrangement.approach import approach_tree
 from pushplan.planners.rearrangement.candidates import partial_pushes
-from pushplan.planners.rearrangement.object_paths import LENGTHS, MOVES
 from pushplan.planners.rearrangement.push import signature
 from pushplan.planners.rearrangement.push_choice import select_push
 from pushplan.planners.rearrangement.push_graph import (
@@ -47,6 +48,16 @@ from pushplan.world.outline import transform
 CORNER = Receptacle([(3.0, 3.0), (5.0, 3.0), (5.0, 5.0), (3.0, 5.0)])
 COLUMN = [(-0.5, 0.0), (0.5, 0.0), (0.5, 1.0), (-0.5, 1.0)]
 AREA = [(-3.0, -3.0), (3.0, -3.0), (3.0, 3.0), (-3.0, 3.0)]
+
+QUARTER = ((1, 0), (2, 1), (1, 1), (1, 2))
+MOVES = np.array(
+    [*QUARTER]
+    + [(-y, x) for x, y in QUARTER]
+    + [(-x, -y) for x, y in QUARTER]
+    + [(y, -x) for x, y in QUARTER]
+)
+"""(16, 2) cells along x and y that a straight move along each heading crosses."""
+LENGTHS = np.hypot(MOVES[:, 0], MOVES[:, 1])
 
 
 def columns_at(*corners):
@@ -270,6 +281,24 @@ def test_boxes_wedged_between_columns_are_nudged_where_nothing_else_is_left():
     for push in many:
         k = int(push.target)
         assert to_go.at(push.object_poses[k]) < to_go.at(here.poses[k])
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_costs_of_pushes_are_those_of_scipy(seed):
+    rng = np.random.default_rng(seed)
+    rows, cols = rng.integers(2, 30, 2)
+    is_open = rng.random((rows, cols)) < 0.8
+    pushable = rng.random((16, rows, cols)) < 0.6
+    graph = dok_array((rows * cols, rows * cols))  # backward
+    for t, (x, y) in enumerate(MOVES):
+        for i, j in np.argwhere(is_open):
+            a, b = i + y, j + x
+            if 0 <= a < rows and 0 <= b < cols and is_open[a, b]:
+                length = LENGTHS[t] * 0.1
+                graph[a * cols + b, i * cols + j] = length if pushable[t, i, j] else 7.0 * length
+    goals = np.flatnonzero(is_open)[:2]
+    wanted = dijkstra(graph.tocsr(), indices=goals, min_only=True).reshape(rows, cols)
+    np.testing.assert_array_equal(core.push_costs(is_open, pushable, goals, 0.1, 7.0), wanted)
 
 
 def small_box(pose, extra=(), robot=(-3.0, -3.0, 0.0)):

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "pushplan/planners/rearrangement/pose_grid.hpp"
+#include "pushplan/search/heap.hpp"
 
 namespace pushplan::rearrangement {
 
@@ -36,6 +38,35 @@ void pushable_moves(ArrayView<const Vec2, 2> middles, ArrayView<const bool, 2> i
           return checker.is_free({middle.x - distance * c - shift * s,
                                   middle.y - distance * s + shift * c, kHeadings[t]});
         });
+      }
+    }
+  }
+}
+
+void fill_push_costs(ArrayView<const bool, 2> is_open, ArrayView<const bool, 3> pushable,
+                     std::span<const Index> goals, double step, double drag_cost,
+                     ArrayView<double, 2> costs) {
+  const Index rows = is_open.extent(0);
+  const Index cols = is_open.extent(1);
+  std::fill_n(costs.data(), costs.size(), std::numeric_limits<double>::infinity());
+  std::vector<Index> places(static_cast<std::size_t>(costs.size()), NodeHeap::kNowhere);
+  const auto place = [&](Index node) -> Index& { return places[static_cast<std::size_t>(node)]; };
+  NodeHeap heap(costs.size());
+  for (const Index goal : goals) {
+    costs.data()[goal] = 0.0;
+    heap.push_or_change(goal, 0.0, place);
+  }
+  while (!heap.empty()) {  // from the goals on, against the moves
+    const Index to = heap.pop(place);
+    for (std::size_t t = 0; t < kHeadingCount; ++t) {
+      const Index i = to / cols - kMoves[t].y;
+      const Index j = to % cols - kMoves[t].x;
+      if (i < 0 || j < 0 || i >= rows || j >= cols || !is_open(i, j)) continue;
+      const double length = kLengths[t] * step;
+      const double cost = costs.data()[to] + (pushable(t, i, j) ? length : drag_cost * length);
+      if (cost < costs(i, j)) {
+        costs(i, j) = cost;
+        heap.push_or_change(i * cols + j, cost, place);
       }
     }
   }

@@ -23,4 +23,12 @@ void pushable_moves(ArrayView<const Vec2, 2> middles,  // (rows, columns) of the
                     CollisionChecker& checker,
                     ArrayView<bool, 3> out);  // (16, rows, columns), false before
 
+/// Writes the cost of the cheapest path of an object from each cell to one of `goals`, which are
+/// counted row by row; infinite where there is none.
+void fill_push_costs(ArrayView<const bool, 2> is_open, ArrayView<const bool, 3> pushable,
+                     std::span<const Index> goals,
+                     double step,       // side of a cell [m]
+                     double drag_cost,  // of a metre of a move that is not pushable
+                     ArrayView<double, 2> costs);
+
 }  // namespace pushplan::rearrangement
