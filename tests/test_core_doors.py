@@ -34,7 +34,7 @@ def call_wrongly(room: str, random_calls: int, log: Path) -> None:
     counts = json.loads(done.stdout)
     assert counts["invalid"] == [], "valid calls are refused"
     # each parameter is refused in several ways
-    assert counts["refusals"] > 5 * counts["parameters"] and counts["results"] > random_calls / 4
+    assert counts["refusals"] > 5 * counts["parameters"] and counts["results"] > random_calls / 10
 
 
 @pytest.mark.parametrize("room", ROOMS)
