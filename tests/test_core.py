@@ -1,5 +1,6 @@
 """The compiled core: its sources, its types, and what a tree without it says."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -69,6 +70,10 @@ def test_the_types_are_those_of_the_module(tmp_path: Path) -> None:
     pytest.importorskip("nanobind")
     command = ["-m", "nanobind.stubgen", "-q", "-r", "-m", "pushplan._core", "-O", str(tmp_path)]
     subprocess.run([sys.executable, *command], check=True)
-    made = {path.name: path.read_text("utf-8") for path in (tmp_path / "_core").iterdir()}
-    kept = {path.name: path.read_text("utf-8") for path in (ROOT / "pushplan/_core").glob("*.pyi")}
-    assert made == kept
+
+    def stubs(folder: Path) -> dict[str, str]:
+        """Without the values of constants, which are those of one build."""
+        found = {path.name: path.read_text("utf-8") for path in folder.glob("*.pyi")}
+        return {name: re.sub(r": str = '.*'", ": str", text) for name, text in found.items()}
+
+    assert stubs(tmp_path / "_core") == stubs(ROOT / "pushplan/_core") != {}

@@ -17,6 +17,6 @@ from pushplan._core import (
 )
 
 
-SOURCES: str = '4d2630027080'
+SOURCES: str
 
-COMPILER: str = 'GNU 12.2.0'
+COMPILER: str
