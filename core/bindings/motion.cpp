@@ -130,9 +130,11 @@ void bind_maps(nb::module_& module) {
         require_count("centres", centres.shape(0), floes.count());
         require_count("radii", radii.shape(0), floes.count());
         require_count("totals", totals.shape(0), floes.count());
-        for (const Vec2 corner : floes.vertices) {
-          require_countable(corner.x);
-          require_countable(corner.y);
+        for (Index k = 0; k < floes.count(); ++k) {  // and not all corners, which may be many more
+          for (const Vec2 corner : floes[k]) {
+            require_countable(corner.x);
+            require_countable(corner.y);
+          }
         }
         add_floes({floes, points(centres), view(radii), {view(totals), exponent, soft}},
                   view(grid));
