@@ -36,7 +36,7 @@ def run(options: argparse.Namespace) -> int:
         for name, policy in EPISODES.items()
         for scenario in suite(name, episodes=1).scenarios
     ]
-    say(f"{len(EPISODES)} episodes; the first time they take up to a minute:")
+    say(f"{len(EPISODES)} episodes:")
     with progress_of(options.out) as progress:
         workers = min(os.cpu_count() or 1, _MOST_WORKERS)
         about = {"suite": "demo"}

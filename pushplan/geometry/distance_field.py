@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pushplan.core import geometry as core
-from pushplan.errors import short
 from pushplan.geometry.contours import standoff_of
 from pushplan.geometry.grid import Grid, clearance_field, nearest_marked
 from pushplan.geometry.regions import outside_area
@@ -33,14 +32,9 @@ def sample_values(
     around the point differ by more, or one is not finite, a wall lies between them and the cell
     that holds the point counts alone, or if it has no value the least of the others.
     """
-    try:
-        field = np.ascontiguousarray(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InvalidInputError(
-            f"values must be an array of numbers, got {short(values)}"
-        ) from error
-    if field.ndim != 2 or field.size == 0:
-        raise InvalidInputError(f"values must be (rows, columns), not empty, got {field.shape}")
+    field: FloatArray = array("values", values, (None, None), finite=False)
+    if field.size == 0:
+        raise InvalidInputError(f"values must have rows and columns, got shape {field.shape}")
     side = number("step", step, low=0.0, open_low=True)
     low = number("ox", ox), number("oy", oy)
     return core.sample(field, *low, side, number("x", x), number("y", y))

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from typing import TypeGuard
-
-import numpy as np
 from numpy.typing import ArrayLike
 
 from pushplan.core import geometry as core
@@ -19,24 +15,10 @@ def corners(name: str, polygon: ArrayLike) -> FloatArray:
     Raises:
         InvalidInputError: naming the polygon otherwise.
     """
-    if _is_checked(polygon):  # as those of thousands of floes are
-        return polygon
     checked: FloatArray = array(name, polygon, (None, 2))
     if len(checked) == 0:
         raise InvalidInputError(f"{name} must have at least one corner, got none")
     return checked
-
-
-def _is_checked(polygon: ArrayLike) -> TypeGuard[FloatArray]:
-    return (
-        type(polygon) is np.ndarray
-        and polygon.dtype == np.float64
-        and polygon.ndim == 2
-        and polygon.shape[1] == 2
-        and polygon.flags.c_contiguous
-        and len(polygon) > 0
-        and math.isfinite(polygon.sum())
-    )
 
 
 def polygon_area(v: FloatArray) -> float:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pushplan.core import geometry as core
 from pushplan.errors import short
 from pushplan.world import InvalidInputError
-from pushplan.world.checks import FloatArray, expect
+from pushplan.world.checks import FloatArray, array, expect
 
 _PIXELS = ("uint8", "float32", "float64", "bool", "int32", "int64")
 
@@ -33,14 +33,7 @@ def fill_convex(image: NDArray[Any], vertices_px: FloatArray, value: Any) -> Non
         raise InvalidInputError(
             f"value must fit into a pixel of {given.dtype.name}, got {short(value)}"
         ) from error
-    try:
-        corners = np.ascontiguousarray(vertices_px, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InvalidInputError(
-            f"vertices_px must be numbers of shape (N, 2), got {short(vertices_px)}"
-        ) from error
-    if corners.ndim != 2 or corners.shape[1] != 2:
-        raise InvalidInputError(f"vertices_px must have shape (N, 2), got {corners.shape}")
+    corners: FloatArray = array("vertices_px", vertices_px, (None, 2), finite=False)
     pixels = np.ascontiguousarray(given)
     core.fill_convex(pixels, corners, pixel)
     if pixels is not image:

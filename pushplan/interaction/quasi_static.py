@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pushplan.core import geometry
 from pushplan.core import interaction as core
-from pushplan.geometry import polygon_inertia
 from pushplan.interaction.interaction_model import Interaction, checked_path
 from pushplan.world import Movables, RobotModel, StaticMap, World
 from pushplan.world.checked_fields import (
@@ -142,7 +142,7 @@ def _width(outlines: FloatArray) -> float:
 def _gyration(shapes: _Shapes) -> FloatArray:
     """(K,) c² of the objects at a scale of 1 [m²]."""
     movables = shapes.movables
-    squares = [polygon_inertia(movables.drawn_outline(k)) for k in range(len(movables))]
+    squares = [geometry.polygon_inertia(movables.drawn_outline(k)) for k in range(len(movables))]
     return frozen(np.array(squares, dtype=np.float64))
 
 

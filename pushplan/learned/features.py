@@ -10,9 +10,9 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
+from pushplan.core import geometry
 from pushplan.core import learned as core
 from pushplan.geometry import GoalDistances, goal_distances
-from pushplan.geometry.transforms import transform_outlines
 from pushplan.observation.builder import LimitedVector
 from pushplan.world import Goal, GoalDisc, GoalLine, StaticMap, World
 from pushplan.world.checked_fields import CheckedFields, Limits, PositiveFloat
@@ -72,7 +72,7 @@ class FeatureObservation(LimitedVector, CheckedFields):
         if self.rays:
             objects = world.movables
             corners = np.empty_like(objects.vertices)
-            transform_outlines(objects.poses, objects.vertices, objects.offsets, corners)
+            geometry.transform_outlines(objects.poses, objects.vertices, objects.offsets, corners)
             rays = out[_GUIDE : _GUIDE + 2 * self.rays].reshape(2, self.rays)
             for row, outlines in zip(
                 rays, (_walls(world.static), (frozen(corners), objects.offsets)), strict=True

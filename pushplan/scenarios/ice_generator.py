@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
+from pushplan.core import geometry
 from pushplan.core import scenarios as core
-from pushplan.geometry import polygon_area
 from pushplan.scenarios.floe_sizes import MARGIN, FloeSizes
 from pushplan.scenarios.ice_field import IceField
 from pushplan.world import InvalidInputError, ScenarioError
@@ -104,7 +104,7 @@ def _pack(
             continue
         shapes = _random_shapes(rng, len(areas))
         floes = _grow(areas, wanted, sizes, *shapes, centres, radii, water)
-        reached = sum(polygon_area(floe) for floe in floes)
+        reached = sum(geometry.polygon_area(floe) for floe in floes)
         if reached >= wanted:
             return IceField(_shrunk(floes, wanted / reached), box)
         best = max(best, reached)
@@ -204,7 +204,7 @@ def _grow(
     for _ in range(_ROUNDS):
         corners, counts = core.fit_floes(shapes, corner_counts, centres, *cells, targets, _STRETCH)
         grown = [corners[k, :n] for k, n in enumerate(counts.tolist()) if n]
-        found = [polygon_area(floe) for floe in grown]
+        found = [geometry.polygon_area(floe) for floe in grown]
         floes = [floe for floe, area in zip(grown, found, strict=True) if area >= least]
         reached = sum(area for area in found if area >= least)
         if reached >= wanted:

@@ -120,6 +120,7 @@ def array(
     shape: tuple[int | None, ...],
     *,
     dtype: DTypeLike = np.float64,
+    finite: bool = True,
 ) -> NDArray[Any]:
     """Copy ``value`` into a read-only, C-contiguous array of the stated shape.
 
@@ -127,7 +128,8 @@ def array(
         name: what the value is called in an error.
         value: anything that NumPy reads as an array.
         shape: expected shape; ``None`` leaves a dimension free.
-        dtype: element type of the result; floats must be finite.
+        dtype: element type of the result.
+        finite: refuse floats that are infinite or NaN.
 
     Raises:
         InvalidInputError: if the type, the shape or an element is wrong.
@@ -154,7 +156,7 @@ def array(
         or any(want not in (None, have) for have, want in zip(result.shape, shape, strict=True))
     ):
         raise InvalidInputError(f"{name} must have shape {_shape_text(shape)}, got {result.shape}")
-    if wanted.kind == "f" and not np.isfinite(result).all():
+    if finite and wanted.kind == "f" and not np.isfinite(result).all():
         bad = np.argwhere(~np.isfinite(result))[0]
         raise InvalidInputError(
             f"{name} must be finite, got {result[tuple(bad)]} at index {tuple(int(i) for i in bad)}"

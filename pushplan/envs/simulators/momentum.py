@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pushplan.core import envs as core
+from pushplan.core import geometry
 from pushplan.envs.simulators.base import Materials
-from pushplan.geometry import polygon_inertia
 from pushplan.world import World
 from pushplan.world.checks import FloatArray, IntArray
 
@@ -31,7 +31,7 @@ class Momentum:
         """For the robot and all objects of a world."""
         movables = world.movables
         moments = [
-            mass * polygon_inertia(movables.drawn_outline(k))
+            mass * geometry.polygon_inertia(movables.drawn_outline(k))
             for k, mass in enumerate(movables.masses)
         ]
         inertia = np.ones((1 + len(movables), 2))

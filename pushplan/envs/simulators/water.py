@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pushplan.core import envs as core
-from pushplan.geometry import polygon_area, polygon_centroid, polygon_inertia
+from pushplan.core import geometry
 from pushplan.world import World
 from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, PositiveFloat
 from pushplan.world.checks import FloatArray, frozen
@@ -62,8 +62,8 @@ def _hull_inertia(world: World) -> float:
     """Polar second moment of the robot's footprint about its origin, per unit mass [m²]."""
     total = moment = 0.0
     for part in world.robot.contact_parts:
-        area = polygon_area(part)
-        x, y = polygon_centroid(part)
+        area = geometry.polygon_area(part)
+        x, y = geometry.polygon_centroid(part)
         total += area
-        moment += area * (polygon_inertia(part) + x * x + y * y)
+        moment += area * (geometry.polygon_inertia(part) + x * x + y * y)
     return moment / total

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pushplan.core import geometry
 from pushplan.core import motion as core
-from pushplan.geometry import transform_outlines
 from pushplan.motion.state_lattice.cost_map import FloeCosts, column_sums
 from pushplan.motion.state_lattice.frame import Frame
 from pushplan.motion.time_slicing import go_on, never
@@ -43,7 +43,7 @@ class LatticeMap:
     ) -> FloatArray:
         """(columns, rows + 1) sums of the costs of each column before each row [m]."""
         corners = np.empty_like(floes.vertices)
-        transform_outlines(floes.poses, floes.vertices, floes.offsets, corners)
+        geometry.transform_outlines(floes.poses, floes.vertices, floes.offsets, corners)
         outlines = np.ascontiguousarray(self.to_cells(corners))
         centres = np.ascontiguousarray(self.to_cells(floes.poses[:, :2]))
         radii = np.sqrt(costs.areas / np.pi) / self.cell  # of the discs of the same areas
