@@ -145,6 +145,12 @@ inline Polygons polygons(const Points& vertices, const Integers<1>& offsets) {
   require_offsets("offsets", made.offsets, made.vertices.size(), 1);
   return made;
 }
+inline Compounds compounds(const Points& vertices, const Integers<1>& offsets,
+                           const Integers<1>& first) {
+  const Compounds made{polygons(vertices, offsets), {first.data(), first.shape(0)}};
+  require_offsets("first_parts", made.first, static_cast<std::size_t>(made.parts.count()), 1);
+  return made;
+}
 inline Pose pose(const OnePose& array) {
   return {array.data()[0], array.data()[1], array.data()[2]};
 }

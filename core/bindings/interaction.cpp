@@ -95,12 +95,16 @@ void bind_interaction(nb::module_& module) {
           "__init__",
           [](Bodies* self, const Points& robot_vertices, const Integers<1>& robot_offsets,
              Index wall_parts, double robot_radius, const Points& vertices,
-             const Integers<1>& offsets, const Floats<1>& radii, const Floats<1>& inverse_masses,
+             const Integers<1>& offsets, const Points& part_vertices,
+             const Integers<1>& part_offsets, const Integers<1>& first_parts,
+             const Floats<1>& radii, const Floats<1>& inverse_masses,
              const Floats<1>& inverse_gyration, const Points& wall_vertices,
              const Integers<1>& wall_offsets, const Floats<2>& wall_boxes) {
             const Polygons robot = polygons(robot_vertices, robot_offsets);
             const Polygons objects = polygons(vertices, offsets);
+            const Compounds shapes = compounds(part_vertices, part_offsets, first_parts);
             const Polygons walls = polygons(wall_vertices, wall_offsets);
+            require_count("first_parts", first_parts.shape(0), objects.count() + 1);
             require_between("wall_parts", wall_parts, 0, robot.count());
             require_count("radii", radii.shape(0), objects.count());
             require_count("inverse_masses", inverse_masses.shape(0), objects.count());
@@ -110,6 +114,7 @@ void bind_interaction(nb::module_& module) {
                               wall_parts,
                               robot_radius,
                               objects,
+                              shapes,
                               view(radii),
                               view(inverse_masses),
                               view(inverse_gyration),
@@ -118,12 +123,14 @@ void bind_interaction(nb::module_& module) {
           },
           "robot_vertices"_a.noconvert(), "robot_offsets"_a.noconvert(), "wall_parts"_a,
           "robot_radius"_a, "vertices"_a.noconvert(), "offsets"_a.noconvert(),
+          "part_vertices"_a.noconvert(), "part_offsets"_a.noconvert(), "first_parts"_a.noconvert(),
           "radii"_a.noconvert(), "inverse_masses"_a.noconvert(), "inverse_gyration"_a.noconvert(),
           "wall_vertices"_a.noconvert(), "wall_offsets"_a.noconvert(), "wall_boxes"_a.noconvert(),
           nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(), nb::keep_alive<1, 6>(),
           nb::keep_alive<1, 7>(), nb::keep_alive<1, 8>(), nb::keep_alive<1, 9>(),
           nb::keep_alive<1, 10>(), nb::keep_alive<1, 11>(), nb::keep_alive<1, 12>(),
-          nb::keep_alive<1, 13>());
+          nb::keep_alive<1, 13>(), nb::keep_alive<1, 14>(), nb::keep_alive<1, 15>(),
+          nb::keep_alive<1, 16>());
 
   nb::class_<QuasiStatic>(module, "QuasiStatic", "Quasi-static pushing with memory for one thread.")
       .def(
@@ -163,8 +170,9 @@ void bind_interaction(nb::module_& module) {
           "__init__",
           [](IceBodies* self, const Points& hull_vertices, const Integers<1>& hull_offsets,
              double hull_radius, const Points& vertices, const Integers<1>& offsets,
-             const Floats<1>& radii, const Floats<1>& masses, const Floats<1>& inverse_gyration) {
-            const Polygons floes = polygons(vertices, offsets);
+             const Integers<1>& first_parts, const Floats<1>& radii, const Floats<1>& masses,
+             const Floats<1>& inverse_gyration) {
+            const Compounds floes = compounds(vertices, offsets, first_parts);
             require_count("radii", radii.shape(0), floes.count());
             require_count("masses", masses.shape(0), floes.count());
             require_count("inverse_gyration", inverse_gyration.shape(0), floes.count());
@@ -176,10 +184,11 @@ void bind_interaction(nb::module_& module) {
                                  view(inverse_gyration)};
           },
           "hull_vertices"_a.noconvert(), "hull_offsets"_a.noconvert(), "hull_radius"_a,
-          "vertices"_a.noconvert(), "offsets"_a.noconvert(), "radii"_a.noconvert(),
-          "masses"_a.noconvert(), "inverse_gyration"_a.noconvert(), nb::keep_alive<1, 2>(),
-          nb::keep_alive<1, 3>(), nb::keep_alive<1, 5>(), nb::keep_alive<1, 6>(),
-          nb::keep_alive<1, 7>(), nb::keep_alive<1, 8>(), nb::keep_alive<1, 9>());
+          "vertices"_a.noconvert(), "offsets"_a.noconvert(), "first_parts"_a.noconvert(),
+          "radii"_a.noconvert(), "masses"_a.noconvert(), "inverse_gyration"_a.noconvert(),
+          nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(), nb::keep_alive<1, 5>(),
+          nb::keep_alive<1, 6>(), nb::keep_alive<1, 7>(), nb::keep_alive<1, 8>(),
+          nb::keep_alive<1, 9>(), nb::keep_alive<1, 10>());
 
   nb::class_<IceContacts>(module, "IceContacts",
                           "Floes that push floes, with memory for one thread.")

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include "check.hpp"
 #include "pushplan/geometry/convex.hpp"
@@ -27,7 +28,15 @@ struct Objects {
     inverse_gyration.push_back(1.0 / polygon_inertia(outline));
   }
 
+  /// As many bodies as outlines.
+  Compounds compounds() const {
+    first.resize(masses.size() + 1);
+    std::iota(first.begin(), first.end(), Index{0});
+    return {shapes.polygons(), first};
+  }
+
   Shapes shapes;
+  mutable std::vector<Index> first;
   std::vector<double> masses;
   std::vector<double> inverse_masses;
   std::vector<double> inverse_gyration;
@@ -40,6 +49,7 @@ struct Scene {
             1,
             radius_of(robot.vertices),
             objects.shapes.polygons(),
+            objects.compounds(),
             objects.shapes.radii,
             objects.inverse_masses,
             objects.inverse_gyration,
@@ -135,7 +145,7 @@ void floes_share_the_work() {
   }
   const Shapes hull({rectangle(-0.5, -0.2, 0.5, 0.2)});
   const IceBodies bodies{
-      hull.polygons(), radius_of(hull.vertices), floes.shapes.polygons(), floes.shapes.radii,
+      hull.polygons(), radius_of(hull.vertices), floes.compounds(), floes.shapes.radii,
       floes.masses,    floes.inverse_gyration};
   const IceSettings settings{0.02, 8, 0.1, 0.1, 1e-6};
   std::vector<Pose> path;

@@ -86,7 +86,6 @@ def draw_moving(
         paths: FloatArray = array("object_trails", object_trails, (None, len(objects), 3))
         for k in range(len(objects)):
             canvas.line(paths[:, k, :2], palette.ghost, 1.5)
-    corners = objects.vertices_world
     reach = canvas.bounds
     middles = objects.poses[:, :2]
     radii = objects.radii[:, None]
@@ -95,11 +94,19 @@ def draw_moving(
         fill, edge = palette.wheeled if objects.wheeled[k] else palette.box
         if objects.fixed[k]:
             fill, edge = palette.fixed
-        outline = corners[objects.offsets[k] : objects.offsets[k + 1]]
-        canvas.polygon(outline, fill, edge, palette.box_edge_px)
-    for poses, outline in pushed(world, plan):  # and where the plan expects them at its end
+        pose = objects.poses[k]
+        parts = objects.parts(k)
+        if len(parts) == 1:
+            canvas.polygon(transform(pose, parts[0]), fill, edge, palette.box_edge_px)
+            continue
+        for part in parts:
+            canvas.polygon(transform(pose, part), fill, fill)
+        for ring in objects.rings(k):
+            canvas.polygon(transform(pose, ring), None, edge, palette.box_edge_px)
+    for poses, rings in pushed(world, plan):  # and where the plan expects them at its end
         canvas.line(poses[:, :2], palette.prediction, 1.5)
-        canvas.polygon(transform(poses[-1], outline), None, palette.prediction, 2.0)
+        for ring in rings:
+            canvas.polygon(transform(poses[-1], ring), None, palette.prediction, 2.0)
     if trail is not None:
         points = np.atleast_2d(np.asarray(trail, dtype=np.float64))
         canvas.line(array("trail", points[:, :2], (None, 2)), palette.trail, 2.5)
@@ -144,8 +151,8 @@ def _with_walls(static: StaticMap) -> FloatArray:
     return frozen(np.concatenate([low, high]))
 
 
-def pushed(world: World, plan: Plan | None) -> list[tuple[FloatArray, FloatArray]]:
-    """The objects that a plan expects to move: (N, 3) poses and (V, 2) outline of each."""
+def pushed(world: World, plan: Plan | None) -> list[tuple[FloatArray, tuple[FloatArray, ...]]]:
+    """The objects that a plan expects to move: (N, 3) poses and outlines (V, 2) of each."""
     if plan is None or plan.object_poses is None:
         return []
     objects = world.movables
@@ -156,7 +163,7 @@ def pushed(world: World, plan: Plan | None) -> list[tuple[FloatArray, FloatArray
         return []
     ways = np.hypot(*np.moveaxis(poses[-1] - poses[0], -1, 0)[:2])
     moved = np.flatnonzero(ways > 1e-3 * objects.radii)
-    return [(poses[:, k], objects.outline(int(k))) for k in moved]
+    return [(poses[:, k], objects.rings(int(k))) for k in moved]
 
 
 def _robot(canvas: Canvas, world: World, palette: Palette) -> None:

@@ -4,7 +4,12 @@ from pushplan.geometry.convex import convex_distance, convex_overlap, convex_pen
 from pushplan.geometry.distance_field import GeodesicField, geodesic_field, sample_values
 from pushplan.geometry.grid import Grid, clearance_field, occupancy
 from pushplan.geometry.obstacles import core_distance
-from pushplan.geometry.polygon import polygon_area, polygon_centroid, polygon_inertia
+from pushplan.geometry.polygon import (
+    gyration_squares,
+    polygon_area,
+    polygon_centroid,
+    polygon_inertia,
+)
 from pushplan.geometry.raster import fill_convex
 from pushplan.geometry.shortest_path import GoalDistances, Path, goal_distances
 from pushplan.geometry.transforms import transform_outlines, transform_points
@@ -24,6 +29,7 @@ __all__ = [
     "fill_convex",
     "geodesic_field",
     "goal_distances",
+    "gyration_squares",
     "occupancy",
     "polygon_area",
     "polygon_centroid",

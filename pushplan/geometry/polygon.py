@@ -1,11 +1,12 @@
-"""Measures of simple polygons: area, centroid, inertia."""
+"""Measures of polygons and of objects: area, centroid, inertia."""
 
 from __future__ import annotations
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from pushplan.core import geometry as core
-from pushplan.world import InvalidInputError
+from pushplan.world import InvalidInputError, Movables
 from pushplan.world.checks import FloatArray, array
 
 
@@ -34,3 +35,27 @@ def polygon_centroid(v: FloatArray) -> tuple[float, float]:
 def polygon_inertia(v: FloatArray) -> float:
     """Second moment ∫ r² dA / A [m²] of corners (N, 2) about the centroid; 0 without area."""
     return core.polygon_inertia(corners("v", v))
+
+
+def gyration_squares(movables: Movables) -> FloatArray:
+    """Moment of inertia over mass about the origin of each object (K,) [m²].
+
+    The square of the radius of its limit surface: as given, or that of its area as drawn.
+    """
+    squares = movables.gyration_radii**2
+    for k in np.flatnonzero(squares == 0.0).tolist():
+        squares[k] = _second_moment(movables.pieces(k))
+    return squares
+
+
+def _second_moment(pieces: tuple[FloatArray, ...]) -> float:
+    """Second moment over area [m²] about the origin, of pieces (N, 2) [m] that do not overlap.
+
+    One piece has its centroid there.
+    """
+    if len(pieces) == 1:
+        return core.polygon_inertia(pieces[0])
+    areas = np.array([core.polygon_area(piece) for piece in pieces])
+    centres = np.array([core.polygon_centroid(piece) for piece in pieces])
+    own = np.array([core.polygon_inertia(piece) for piece in pieces])
+    return float(areas @ (own + (centres**2).sum(axis=1)) / areas.sum())

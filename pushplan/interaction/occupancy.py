@@ -126,8 +126,8 @@ def ice_density(world: World) -> float:
     movables = world.movables
     if len(movables) == 0:
         return 1.0
-    (x, y) = movables.vertices.T
-    following = next_corner(movables.offsets)
+    (x, y) = movables.part_vertices.T
+    following = next_corner(movables.part_offsets)
     area = 0.5 * float((x * y[following] - x[following] * y).sum())
     return float(movables.masses.sum()) / area
 
@@ -196,4 +196,5 @@ def patch_after(batch: PassageBatch, index: int, poses: ArrayLike) -> Patch:
 def _cover(
     objects: Movables, poses: FloatArray, frame: FloatArray, cell: float, out: Patch
 ) -> None:
-    core.cover_objects(poses, objects.vertices, objects.offsets, frame, cell, out)
+    parts = (poses[objects.part_owners], objects.part_vertices, objects.part_offsets)
+    core.cover_objects(*parts, frame, cell, out)

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pushplan.core import geometry
 from pushplan.core import interaction as core
+from pushplan.geometry import gyration_squares
 from pushplan.interaction.interaction_model import Interaction, checked_path
 from pushplan.world import Movables, RobotModel, StaticMap, World
 from pushplan.world.checked_fields import (
@@ -104,12 +104,15 @@ class _Shapes:
 
     def __init__(self, movables: Movables) -> None:
         self.movables = movables
-        self.key = (
-            movables.vertices.tobytes(),
-            movables.offsets.tobytes(),
-            movables.contact_radii.tobytes(),
-            movables.masses.tobytes(),
+        arrays = (
+            movables.part_vertices,
+            movables.part_offsets,
+            movables.first_parts,
+            movables.contact_radii,
+            movables.gyration_radii,
+            movables.masses,
         )
+        self.key = tuple(values.tobytes() for values in arrays)
 
     def __hash__(self) -> int:
         return hash(self.key)
@@ -122,7 +125,7 @@ class _Shapes:
 def _thinnest(robot: RobotModel, shapes: _Shapes) -> float:
     """Half diagonal of the square that is as wide as the thinnest body [m]."""
     movables = shapes.movables
-    outlines = [*robot.wall_parts, *unflatten(movables.vertices, movables.offsets)]
+    outlines = [*robot.wall_parts, *unflatten(movables.part_vertices, movables.part_offsets)]
     floor = robot.circumscribed_radius / _MOST_SLENDER
     sizes = {len(outline) for outline in outlines}  # those with as many corners at once
     widths = [_width(np.stack([o for o in outlines if len(o) == size])) for size in sizes]
@@ -141,9 +144,7 @@ def _width(outlines: FloatArray) -> float:
 @functools.lru_cache(maxsize=32)
 def _gyration(shapes: _Shapes) -> FloatArray:
     """(K,) c² of the objects at a scale of 1 [m²]."""
-    movables = shapes.movables
-    squares = [geometry.polygon_inertia(movables.drawn_outline(k)) for k in range(len(movables))]
-    return frozen(np.array(squares, dtype=np.float64))
+    return frozen(gyration_squares(shapes.movables))
 
 
 def inverse_gyration(movables: Movables) -> FloatArray:
@@ -162,6 +163,9 @@ def _bodies(robot: RobotModel, shapes: _Shapes, static: StaticMap, gyration: flo
         robot_radius=robot.circumscribed_radius,
         vertices=movables.vertices,
         offsets=movables.offsets,
+        part_vertices=movables.part_vertices,
+        part_offsets=movables.part_offsets,
+        first_parts=movables.first_parts,
         radii=movables.radii,
         inverse_masses=1.0 / movables.masses,
         inverse_gyration=1.0 / (_gyration(shapes) * gyration**2),

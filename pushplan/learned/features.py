@@ -71,11 +71,12 @@ class FeatureObservation(LimitedVector, CheckedFields):
         self._guide(out[2:_GUIDE], world, to_body)
         if self.rays:
             objects = world.movables
-            corners = np.empty_like(objects.vertices)
-            geometry.transform_outlines(objects.poses, objects.vertices, objects.offsets, corners)
+            corners = np.empty_like(objects.part_vertices)
+            poses = objects.poses[objects.part_owners]
+            geometry.transform_outlines(poses, objects.part_vertices, objects.part_offsets, corners)
             rays = out[_GUIDE : _GUIDE + 2 * self.rays].reshape(2, self.rays)
             for row, outlines in zip(
-                rays, (_walls(world.static), (frozen(corners), objects.offsets)), strict=True
+                rays, (_walls(world.static), (frozen(corners), objects.part_offsets)), strict=True
             ):
                 lengths = np.full(self.rays, self.range)
                 core.cast_rays(lengths, x, y, theta, *outlines)

@@ -13,7 +13,7 @@ from pushplan.motion.time_slicing import never
 from pushplan.search.grid_dijkstra import grid_dijkstra
 from pushplan.world import GoalDisc, StaticMap, World
 from pushplan.world.checks import FloatArray, frozen
-from pushplan.world.outline import flatten, outline_boxes, unflatten
+from pushplan.world.outline import flatten, outline_boxes
 
 _SIDE = 96  # cells along the longer side of the workspace, if that resolves the robot's own width
 _MOST = 400  # cells along the longer side at most
@@ -48,9 +48,10 @@ def coarse_path(
     walls = _wall_weights(keep_out(world), cell, ((inner, np.inf), (1.3 * outer, 2.0)))
     # passing through the middle of a box pushes it for about a robot's width
     per_metre = push_weight * objects.masses / robot.mass
-    boxes = unflatten(objects.vertices_world, objects.offsets)
+    boxes = objects.every_part_world
     reach = np.full(len(boxes), outer)
-    extra = walls + _grid_weights(world.static.bounds, cell, boxes, reach, per_metre)
+    weights = per_metre[objects.part_owners]
+    extra = walls + _grid_weights(world.static.bounds, cell, boxes, reach, weights)
     return _cheapest(world, extra, cell, stopped)
 
 

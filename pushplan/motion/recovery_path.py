@@ -27,7 +27,8 @@ def recovery_path(world: World, margin: float) -> FloatArray | None:
         margin: distance to keep from what is static if it can [m].
     """
     size = world.robot.circumscribed_radius
-    objects = [world.movables.outline_world(k) for k in range(len(world.movables))]
+    movables = world.movables
+    objects = [part for k in range(len(movables)) for part in movables.parts_world(k)]
     start = world.robot_pose
     walls = obstacles(world.static)
     steps = STEP * np.array([(size, curvature) for curvature in _CURVATURES])

@@ -14,7 +14,6 @@ from pushplan.motion.path_improver import ENDLESS, Lead, PathImprover
 from pushplan.motion.room_ahead import way_to_turn
 from pushplan.world import Drive
 from pushplan.world.checks import FloatArray
-from pushplan.world.outline import unflatten
 from pushplan.world.polyline import arc_lengths
 
 _LEAST = 0.1
@@ -75,7 +74,7 @@ def drive_to_turn(improver: PathImprover) -> Lead | None:
     world = improver.world
     room = improver.room
     start = world.robot_pose
-    boxes = unflatten(world.movables.vertices_world, world.movables.offsets)
+    boxes = world.movables.every_part_world
     among = obstacles(keep_out(world), boxes)
     for walls in (among, room.walls) if boxes else (room.walls,):
         for shape in (room.footprint, footprint(world.robot)):

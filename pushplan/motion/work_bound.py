@@ -113,7 +113,7 @@ class _Relaxation:
         self.start = world.robot_pose[:2]
         self.centers = world.movables.poses[:, :2]
         count = len(world.movables)
-        inner = [inscribed_radius(world.movables.outline(k)) for k in range(count)]
+        inner = [max(map(inscribed_radius, world.movables.parts(k))) for k in range(count)]
         self.inner = (1.0 - SLIM) * np.array(inner, dtype=np.float64).reshape(count)
 
     def root(self) -> _Node | None:

@@ -142,8 +142,9 @@ CHANNELS: dict[str, Callable[[Image, View], None]] = {
 
 def _fill_movables(image: Image, view: View, value: int) -> None:
     objects = view.world.movables
-    shapes = objects.poses, objects.vertices, objects.offsets, objects.radii
-    core.fill_bodies(image, view.numbers, *shapes, value)
+    owners = objects.part_owners
+    shapes = objects.poses[owners], objects.part_vertices, objects.part_offsets
+    core.fill_bodies(image, view.numbers, *shapes, objects.radii[owners], value)
 
 
 def _fill_static(image: Image, view: View) -> None:

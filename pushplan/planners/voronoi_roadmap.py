@@ -244,8 +244,8 @@ def _outlines(world: World) -> tuple[FloatArray, IntArray]:
     """(V, 2) corners of all objects, then of all obstacles [m], and how many each has."""
     floes = world.movables
     (vertices, offsets) = flatten(keep_out(world).convex_parts)
-    counts = np.concatenate([np.diff(floes.offsets), np.diff(offsets)])
-    return np.concatenate([floes.vertices_world, vertices]), counts
+    counts = np.concatenate([np.diff(floes.part_offsets), np.diff(offsets)])
+    return np.concatenate([floes.part_vertices_world, vertices]), counts
 
 
 def skeleton(planner: Planner | None = None, stop: Stop | None = None) -> PlanFollower:

@@ -55,8 +55,8 @@ def object_markers(messages: Messages, world: World, which: Sequence[int], gone:
         gone: ids of those that are not there any more.
     """
     objects = world.movables
-    outlines = {int(objects.ids[k]): [objects.outline(k)] for k in which}
-    outlines |= {number: [] for number in sorted(gone)}
+    outlines = {int(objects.ids[k]): objects.parts(k) for k in which}
+    outlines |= {number: () for number in sorted(gone)}
     markers = [
         _marker(messages, "object", number, object_frame(number), world.time, some)
         for number, some in outlines.items()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from collections.abc import Sequence
 from operator import attrgetter
 from pathlib import Path
 from typing import Any
@@ -102,11 +103,11 @@ class McapWriter:
             object_poses=objects.poses.ravel(),
             new_objects=json.dumps([described[k] for k in new]),
         )
-        outlines = {number: objects.outline(k) for k, number in enumerate(ids)}
+        outlines = {number: objects.parts(k) for k, number in enumerate(ids)}
         changed = [
             k
             for k, number in enumerate(ids)
-            if not np.array_equal(self._shown.get(number, ()), outlines[number])
+            if not _same(self._shown.get(number, ()), outlines[number])
         ]
         gone = self._shown.keys() - outlines.keys()
         if changed or gone:
@@ -162,3 +163,7 @@ class McapWriter:
         number = self._counts[topic]
         self._counts[topic] += 1
         self._writer.add_message(self._channels[topic], stamp, data, stamp, number)
+
+
+def _same(parts: Sequence[FloatArray], others: Sequence[FloatArray]) -> bool:
+    return len(parts) == len(others) and all(map(np.array_equal, parts, others))

@@ -142,7 +142,7 @@ class ObstacleGuard:
             return []
         objects = world.movables
         chosen = np.flatnonzero(np.isin(objects.ids, list(self._new_fixed))).tolist()
-        held = [objects.outline_world(k) for k in chosen]
+        held = [part for k in chosen for part in objects.parts_world(k)]
         outlines = [*self._new, *held]
         boxes = outline_boxes(*flatten(outlines))
         path = np.concatenate([path for _, path in self._paths(world, twist)])

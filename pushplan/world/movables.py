@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Annotated, Any
@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pushplan.errors import InvalidInputError
+from pushplan.errors import InvalidInputError, short
 from pushplan.world.checked_fields import CheckedFields, Shape
 from pushplan.world.checks import (
     ArrayRecord,
@@ -22,26 +22,28 @@ from pushplan.world.checks import (
     frozen,
     number,
 )
+from pushplan.world.convex_shapes import ConvexParts, areas_and_centres, disjoint, rings_of, shapes_of
 from pushplan.world.outline import (
     LARGEST_M,
     areas_and_centroids,
+    convex_hull,
     convex_outline,
-    convex_outlines,
     flatten,
     grown_outlines,
     transform,
     transform_outlines,
+    unflatten,
     well_formed,
 )
 
-_ONE_EACH = ("poses", "twists", "masses", "wheeled", "contact_radii", "fixed")
+_ONE_EACH = ("poses", "twists", "masses", "wheeled", "contact_radii", "fixed", "gyration_radii")
 
 
 @dataclass(frozen=True, eq=False)
 class Movables(ArrayRecord, CheckedFields):
-    """K convex objects that the robot may push.
+    """K objects that the robot may push, each a union of convex parts.
 
-    The origin of each body frame is the centroid of its outline, where the pressure on the
+    The origin of each body frame is the centroid of the object, where the pressure on the
     ground is centred; `from_polygons` does that for corners in the world frame.
 
     Args:
@@ -50,18 +52,23 @@ class Movables(ArrayRecord, CheckedFields):
         twists: (K, 3) velocities in the world frame [m/s, m/s, rad/s].
         masses: (K,) masses as the metrics count them [kg], positive.
         wheeled: (K,) True where the object stands on casters and rolls.
-        drawn_vertices: (V, 2) convex outlines as drawn, in body frames, flattened [m];
+        drawn_vertices: (V, 2) outlines of P convex parts as drawn, in body frames, flattened [m];
             `convex_outline` says what is taken.
-        drawn_offsets: (K + 1,) where each outline starts in ``drawn_vertices``.
+        drawn_offsets: (P + 1,) where each part starts in ``drawn_vertices``.
         contact_radii: (K,) distances from the drawn outlines at which objects touch others [m]:
             they are rounded by them. `vertices` are grown by them, and everything but masses,
             goals and files reads those.
         fixed: (K,) True where the object is held not to move, as far as one knows; all false if
             None. Planners count it as static (`World.with_fixed_as_static`); in a simulator's own
             world it is the truth.
+        first_parts: (K + 1,) number of the first part of each object, then P; by default every
+            object has one part.
+        gyration_radii: (K,) radius of the limit surface of each object [m], whose square is moment
+            of inertia over mass; where it is 0, which is the default, it follows from the area.
+            Where it is given, the origin is the centre of pressure, wherever that is.
 
     Raises:
-        InvalidInputError: if shapes disagree, an outline is not convex or off its centroid.
+        InvalidInputError: if shapes disagree, a part is not convex or an object off its centroid.
     """
 
     field_prefix = "movables."
@@ -77,13 +84,28 @@ class Movables(ArrayRecord, CheckedFields):
     fixed: Annotated[BoolArray, Shape("K")] = field(
         default_factory=lambda: np.zeros(0, dtype=np.bool_)
     )
+    first_parts: Annotated[IntArray, Shape(None)] = field(
+        default_factory=lambda: np.zeros(0, dtype=np.int64)
+    )
+    gyration_radii: Annotated[FloatArray, Shape("K")] = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         ids: IntArray = array("movables.ids", self.ids, (None,), dtype=np.int64)
-        if self.fixed is None or np.array_equal(self.fixed, []):
-            object.__setattr__(self, "fixed", np.zeros(len(ids), dtype=np.bool_))
+        defaults = {
+            "fixed": np.zeros(len(ids), dtype=np.bool_),
+            "first_parts": np.arange(len(ids) + 1),
+            "gyration_radii": np.zeros(len(ids)),
+        }
+        for name, default in defaults.items():
+            given = getattr(self, name)
+            if given is None or np.array_equal(given, []):
+                object.__setattr__(self, name, default)
         super().__post_init__()
-        array("movables.drawn_offsets", self.drawn_offsets, (len(self.ids) + 1,), dtype=np.int64)
+        _check_starts("movables.first_parts", self.first_parts, len(self.ids))
+        parts = int(self.first_parts[-1])
+        if (np.diff(self.first_parts) < 1).any():
+            raise InvalidInputError("movables.first_parts must give every object a part")
+        _check_starts("movables.drawn_offsets", self.drawn_offsets, parts)
         if len(np.unique(self.ids)) != len(self.ids):
             raise InvalidInputError(f"movables.ids must be distinct, got {self.ids.tolist()}")
         if (self.masses <= 0.0).any():
@@ -96,8 +118,10 @@ class Movables(ArrayRecord, CheckedFields):
             raise InvalidInputError(
                 f"movables.contact_radii must be at most {LARGEST_M:g} m, got {most:g}"
             )
-        ends = self.drawn_offsets[[0, -1]].tolist()
-        if ends != [0, len(self.drawn_vertices)] or (np.diff(self.drawn_offsets) < 0).any():
+        if (self.gyration_radii < 0.0).any():
+            least = self.gyration_radii.min()
+            raise InvalidInputError(f"movables.gyration_radii must not be negative, got {least}")
+        if self.drawn_offsets[-1] != len(self.drawn_vertices):
             raise InvalidInputError(
                 "movables.drawn_offsets must rise from 0 to len(drawn_vertices)"
             )
@@ -107,14 +131,16 @@ class Movables(ArrayRecord, CheckedFields):
         good = well_formed(self.drawn_vertices, self.drawn_offsets)
         if not good.all():
             outlines = [
-                convex_outline(f"outline of movable {self.ids[k]}", self.drawn_outline(k))
+                convex_outline(f"outline of movable {self.ids[k]}", part)
                 for k in range(len(self))
+                for part in self.drawn_parts(k)
             ]
             vertices, offsets = flatten(outlines)
             object.__setattr__(self, "drawn_vertices", vertices)
             object.__setattr__(self, "drawn_offsets", offsets)
-        _, centres = areas_and_centroids(self.drawn_vertices, self.drawn_offsets)
-        for k in np.flatnonzero(np.abs(centres).max(axis=1) > 1e-6 * self.radii).tolist():
+        centres = self._areas_and_centres[1]
+        off = np.abs(centres).max(axis=1, initial=0.0) > 1e-6 * self.radii
+        for k in np.flatnonzero(off & (self.gyration_radii == 0.0)).tolist():
             raise InvalidInputError(
                 f"outline of movable {self.ids[k]} must have its centroid at the body origin, it "
                 f"is at ({centres[k, 0]:g}, {centres[k, 1]:g}); Movables.from_polygons shifts it"
@@ -141,11 +167,14 @@ class Movables(ArrayRecord, CheckedFields):
         ids: ArrayLike | None = None,
         contact_radii: ArrayLike = 0.0,
         fixed: ArrayLike | None = None,
+        gyration_radii: ArrayLike | None = None,
     ) -> Movables:
         """Objects from body-frame outlines whose centroid is the body origin.
 
         Args:
-            outlines: K convex outlines as drawn, each (N, 2) [m].
+            outlines: K outlines as drawn: (N, 2) corners [m], a polygon of Shapely or a list of
+                either, whose union is the object. What is not convex is cut into convex parts,
+                and repaired if need be; see `pushplan.world.outline_parts`.
             poses: (K, 3) x, y [m], theta [rad].
             masses: (K,) [kg]; by default area times ``density``.
             density: [kg/m²].
@@ -154,13 +183,14 @@ class Movables(ArrayRecord, CheckedFields):
             ids: (K,), by default 0 to K - 1.
             contact_radii: (K,), or one for all [m].
             fixed: (K,) flags, by default all false.
+            gyration_radii: (K,) radii of the limit surfaces [m], by default those of the outlines.
         """
-        clean = convex_outlines("outline", outlines)
-        vertices, offsets = flatten(clean)
-        count = len(clean)
+        shapes = shapes_of("outline", outlines)
+        count = len(shapes)
+        vertices, offsets = flatten([part for parts in shapes for part in parts])
         if masses is None:
             density = number("density", density, low=0.0, open_low=True)
-            masses = areas_and_centroids(vertices, offsets)[0] * density
+            masses = areas_and_centres([disjoint(parts) for parts in shapes])[0] * density
         values: dict[str, Any] = {
             "ids": np.arange(count) if ids is None else ids,
             "poses": poses,
@@ -169,6 +199,8 @@ class Movables(ArrayRecord, CheckedFields):
             "wheeled": np.zeros(count, dtype=bool) if wheeled is None else wheeled,
             "contact_radii": contact_radii,
             "fixed": fixed,
+            "first_parts": np.cumsum([0, *map(len, shapes)]),
+            "gyration_radii": gyration_radii,
         }
         if not np.iterable(contact_radii):
             values["contact_radii"] = [contact_radii] * count
@@ -180,53 +212,160 @@ class Movables(ArrayRecord, CheckedFields):
         polygons: Sequence[ArrayLike],
         **options: Any,
     ) -> Movables:
-        """Objects from convex polygons in the world frame, as perception reports them.
+        """Objects from polygons in the world frame, as perception reports them.
 
         Each gets a pose at its centroid with theta = 0.
 
         Args:
-            polygons: K convex polygons, each (N, 2) [m].
+            polygons: K shapes as `from_outlines` takes them [m].
             options: further arguments of `from_outlines`, such as ``masses``.
         """
-        clean = convex_outlines("polygon", polygons)
-        _, centres = areas_and_centroids(*flatten(clean))
-        poses = np.column_stack([centres, np.zeros(len(clean))])
-        outlines = [c - centre for c, centre in zip(clean, centres, strict=True)]
+        shapes = shapes_of("polygon", polygons)
+        centres = areas_and_centres([disjoint(parts) for parts in shapes])[1]
+        poses = np.column_stack([centres, np.zeros(len(shapes))])
+        outlines = [
+            [part - centre for part in parts] for parts, centre in zip(shapes, centres, strict=True)
+        ]
         return cls.from_outlines(outlines, poses, **options)
 
+    @property
+    def is_compound(self) -> bool:
+        """True if some object has more than one part."""
+        return len(self.first_parts) != len(self.drawn_offsets)
+
     @cached_property
-    def _contact_outlines(self) -> tuple[FloatArray, IntArray]:
+    def part_owners(self) -> IntArray:
+        """(P,) object to which each part belongs."""
+        owners: IntArray = np.repeat(np.arange(len(self)), np.diff(self.first_parts))
+        return frozen(owners)
+
+    @cached_property
+    def _contact_parts(self) -> tuple[FloatArray, IntArray]:
         if not self.contact_radii.any():
             return self.drawn_vertices, self.drawn_offsets
-        grown = grown_outlines(self.drawn_vertices, self.drawn_offsets, self.contact_radii)
+        radii = self.contact_radii[self.part_owners]
+        grown = grown_outlines(self.drawn_vertices, self.drawn_offsets, radii)
         return frozen(grown[0]), frozen(grown[1])
+
+    @cached_property
+    def _contact_hulls(self) -> tuple[FloatArray, IntArray]:
+        if not self.is_compound:
+            return self._contact_parts
+        hulls = [
+            parts[0] if len(parts) == 1 else convex_hull(np.concatenate(parts))
+            for parts in map(self.parts, range(len(self)))
+        ]
+        return flatten(hulls)
+
+    @property
+    def part_vertices(self) -> FloatArray:
+        """(W, 2) parts as others touch them: grown by the contact radii, not rounded [m]."""
+        return self._contact_parts[0]
+
+    @property
+    def part_offsets(self) -> IntArray:
+        """(P + 1,) where each part starts in `part_vertices`."""
+        return self._contact_parts[1]
 
     @property
     def vertices(self) -> FloatArray:
-        """(V, 2) outlines as others touch them: grown by the contact radii, not rounded [m]."""
-        return self._contact_outlines[0]
+        """(V, 2) convex hulls of the objects as others touch them [m]."""
+        return self._contact_hulls[0]
 
     @property
     def offsets(self) -> IntArray:
-        """(K + 1,) where each outline starts in `vertices`."""
-        return self._contact_outlines[1]
+        """(K + 1,) where each hull starts in `vertices`."""
+        return self._contact_hulls[1]
 
-    def drawn_outline(self, k: int) -> FloatArray:
-        """(N, 2) corners of object ``k`` as drawn, in its body frame [m]."""
-        return self.drawn_vertices[self.drawn_offsets[k] : self.drawn_offsets[k + 1]]
+    def drawn_parts(self, k: int) -> ConvexParts:
+        """Convex parts of object ``k`` as drawn, each (N, 2) in its body frame [m]."""
+        first, last = self.first_parts[k : k + 2].tolist()
+        return unflatten(self.drawn_vertices, self.drawn_offsets[first : last + 1])
+
+    def parts(self, k: int) -> ConvexParts:
+        """Convex parts of object ``k`` as others touch it, each (N, 2) in its body frame [m]."""
+        first, last = self.first_parts[k : k + 2].tolist()
+        return unflatten(self.part_vertices, self.part_offsets[first : last + 1])
+
+    def rings(self, k: int) -> tuple[FloatArray, ...]:
+        """Closed outlines of object ``k`` as others touch it, holes too, each (N, 2) [m]."""
+        return rings_of(self.parts(k))
+
+    def parts_world(self, k: int) -> ConvexParts:
+        """The `parts` of object ``k`` in the world frame [m]."""
+        return tuple(transform(self.poses[k], part) for part in self.parts(k))
+
+    def within(
+        self,
+        contains_each: Callable[[FloatArray, IntArray], BoolArray],
+        poses: FloatArray | None = None,
+    ) -> BoolArray:
+        """(K,) True for objects all of whose parts, as drawn, are within an area.
+
+        Args:
+            contains_each: takes flattened outlines in the world frame, and says it of each.
+            poses: (K, 3) of the objects; where they are if None.
+        """
+        at = (self.poses if poses is None else poses)[self.part_owners]
+        corners = transform_outlines(at, self.drawn_vertices, self.drawn_offsets)
+        inside = contains_each(corners, self.drawn_offsets)
+        if not self.is_compound:
+            return inside
+        every: BoolArray = np.logical_and.reduceat(inside, self.first_parts[:-1])
+        return every
 
     def outline(self, k: int) -> FloatArray:
-        """(N, 2) corners of object ``k`` as others touch it, in its body frame [m]."""
+        """(N, 2) convex hull of object ``k`` as others touch it, in its body frame [m]."""
         return self.vertices[self.offsets[k] : self.offsets[k + 1]]
 
     def outline_world(self, k: int) -> FloatArray:
-        """(N, 2) corners of object ``k`` in the world frame [m]."""
+        """(N, 2) convex hull of object ``k`` in the world frame [m]."""
         return transform(self.poses[k], self.outline(k))
 
     @property
     def vertices_world(self) -> FloatArray:
         """(V, 2) `vertices` in the world frame [m]."""
         return transform_outlines(self.poses, self.vertices, self.offsets)
+
+    @property
+    def every_part_world(self) -> ConvexParts:
+        """The P parts of all objects in the world frame, each (N, 2) [m]."""
+        return unflatten(self.part_vertices_world, self.part_offsets)
+
+    @property
+    def part_vertices_world(self) -> FloatArray:
+        """(W, 2) `part_vertices` in the world frame [m]."""
+        return transform_outlines(
+            self.poses[self.part_owners], self.part_vertices, self.part_offsets
+        )
+
+    def pieces(self, k: int) -> ConvexParts:
+        """Convex pieces that make up object ``k`` as drawn and do not overlap, each (N, 2) [m].
+
+        Sums over its area are sums over them.
+        """
+        return disjoint(self.drawn_parts(k))
+
+    def contact_pieces(self, k: int) -> ConvexParts:
+        """The `pieces` of object ``k`` as others touch it."""
+        return disjoint(self.parts(k))
+
+    @cached_property
+    def _areas_and_centres(self) -> tuple[FloatArray, FloatArray]:
+        if not self.is_compound:
+            return areas_and_centroids(self.drawn_vertices, self.drawn_offsets)
+        return areas_and_centres([self.pieces(k) for k in range(len(self))])
+
+    @property
+    def areas(self) -> FloatArray:
+        """(K,) areas of the objects as drawn [m²]."""
+        return self._areas_and_centres[0]
+
+    @property
+    def contact_areas(self) -> FloatArray:
+        """(K,) areas of the objects as others touch them, the sums of those of their parts [m²]."""
+        areas, _ = areas_and_centroids(self.part_vertices, self.part_offsets)
+        return areas if not self.is_compound else np.add.reduceat(areas, self.first_parts[:-1])
 
     def moved_to(self, poses: ArrayLike, twists: ArrayLike | None = None) -> Movables:
         """The same objects at other poses (K, 3); at rest unless twists (K, 3) are given.
@@ -287,8 +426,9 @@ class Movables(ArrayRecord, CheckedFields):
             name: np.concatenate([getattr(self, name), getattr(changes, name)])
             for name in (*_ONE_EACH, "ids", "drawn_vertices")
         }
-        more = self.drawn_offsets[-1] + changes.drawn_offsets[1:]
-        values["drawn_offsets"] = np.concatenate([self.drawn_offsets, more], dtype=np.int64)
+        for name in ("drawn_offsets", "first_parts"):
+            more = getattr(self, name)[-1] + getattr(changes, name)[1:]
+            values[name] = np.concatenate([getattr(self, name), more], dtype=np.int64)
         index = np.arange(len(self))
         index[at[known]] = len(self) + known
         kept = np.ones(len(self), dtype=np.bool_)
@@ -305,13 +445,9 @@ class Movables(ArrayRecord, CheckedFields):
     def _gathered(self, index: IntArray) -> Movables:
         """The objects (N,) at an index each, which are distinct."""
         values = {name: frozen(getattr(self, name)[index]) for name in (*_ONE_EACH, "ids")}
-        counts = np.diff(self.drawn_offsets)[index]
-        offsets = np.zeros(len(index) + 1, dtype=np.int64)
-        np.cumsum(counts, out=offsets[1:])
-        starts = self.drawn_offsets[index]
-        corners = np.arange(offsets[-1]) + np.repeat(starts - offsets[:-1], counts)
+        parts, values["first_parts"] = _rows_of(self.first_parts, index)
+        corners, values["drawn_offsets"] = _rows_of(self.drawn_offsets, parts)
         values["drawn_vertices"] = frozen(self.drawn_vertices[corners])
-        values["drawn_offsets"] = frozen(offsets)
         return self._unchecked(values)
 
     def _index_of(self, ids: IntArray) -> IntArray:
@@ -328,7 +464,8 @@ class Movables(ArrayRecord, CheckedFields):
 
     def _has_outlines_of(self, others: Movables, at: IntArray) -> bool:
         return np.array_equal(self.contact_radii[at], others.contact_radii) and all(
-            np.array_equal(self.drawn_outline(k), others.drawn_outline(j))
+            len(self.drawn_parts(k)) == len(others.drawn_parts(j))
+            and all(map(np.array_equal, self.drawn_parts(k), others.drawn_parts(j)))
             for j, k in enumerate(at.tolist())
         )
 
@@ -339,3 +476,23 @@ class Movables(ArrayRecord, CheckedFields):
             return frozen(np.zeros(0))
         reach = np.hypot(self.vertices[:, 0], self.vertices[:, 1])
         return frozen(np.maximum.reduceat(reach, self.offsets[:-1]))
+
+
+def _rows_of(starts: IntArray, index: IntArray) -> tuple[IntArray, IntArray]:
+    """The rows of some of a list of groups, and where each of these then starts.
+
+    Args:
+        starts: (G + 1,) row at which each group starts.
+        index: (N,) the groups.
+    """
+    counts = np.diff(starts)[index]
+    offsets = np.zeros(len(index) + 1, dtype=np.int64)
+    np.cumsum(counts, out=offsets[1:])
+    rows = np.arange(offsets[-1]) + np.repeat(starts[index] - offsets[:-1], counts)
+    return rows, frozen(offsets)
+
+
+def _check_starts(name: str, starts: IntArray, count: int) -> None:
+    array(name, starts, (count + 1,), dtype=np.int64)
+    if starts[0] != 0 or (np.diff(starts) < 0).any():
+        raise InvalidInputError(f"{name} must rise from 0, got {short(starts.tolist())}")

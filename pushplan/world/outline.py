@@ -69,7 +69,7 @@ def convex_outline(name: str, corners: ArrayLike) -> FloatArray:
 
     The corners may go round either way, and the first may be repeated at the end. An outline that
     breaks a rule only by rounding is mended: corners that are repeated, or that rounding has put
-    inside, are left out. See `_rounding`.
+    inside, are left out. See `rounding_of`.
 
     Raises:
         InvalidInputError: fewer than 3 corners, no area, or not convex.
@@ -80,14 +80,14 @@ def convex_outline(name: str, corners: ArrayLike) -> FloatArray:
         raise InvalidInputError(f"{name} must lie within {LARGEST_M:g} m, got {largest:g} m")
     if len(points) < 3:
         raise InvalidInputError(f"{name} must have at least 3 corners, got {len(points)}")
-    ring = _counter_clockwise(points)
+    ring = counter_clockwise(points)
     if _is_well_formed(ring):
         return ring
-    rounding = _rounding(points)
+    rounding = rounding_of(points)
     steps = np.roll(points, -1, axis=0) - points
     lengths = np.hypot(steps[:, 0], steps[:, 1])
     for least in (1e-3 * rounding, rounding):  # a closed ring is not to lose its short edges
-        ring = _counter_clockwise(points[lengths > least])
+        ring = counter_clockwise(points[lengths > least])
         if len(ring) < 3:
             raise InvalidInputError(f"{name} must have at least 3 corners that differ")
         if _is_well_formed(ring):
@@ -103,7 +103,7 @@ def convex_hull(corners: FloatArray) -> FloatArray:
     import shapely  # takes long to load, and few outlines need it
 
     ring = shapely.get_coordinates(shapely.convex_hull(shapely.multipoints(corners)))[:-1]
-    return _counter_clockwise(ring)
+    return counter_clockwise(ring)
 
 
 def _without_dents(name: str, ring: FloatArray, rounding: float) -> FloatArray:
@@ -127,7 +127,7 @@ def _without_dents(name: str, ring: FloatArray, rounding: float) -> FloatArray:
     return spanning
 
 
-def _rounding(points: FloatArray) -> float:
+def rounding_of(points: FloatArray) -> float:
     """Distance [m] that counts as rounding in an outline.
 
     A millionth of its size, and four times what float32 loses of its greatest coordinate; at most
@@ -138,7 +138,7 @@ def _rounding(points: FloatArray) -> float:
     return min(1e-6 * size + 4.0 * single, 1e-3 * size)
 
 
-def _counter_clockwise(points: FloatArray) -> FloatArray:
+def counter_clockwise(points: FloatArray) -> FloatArray:
     """The corners in the other order if they run clockwise."""
     if len(points) < 3 or signed_area(points) >= 0.0:
         return points

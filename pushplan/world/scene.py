@@ -20,7 +20,7 @@ from pushplan.world.goals import (
     NavigationGoal,
 )
 from pushplan.world.movables import Movables
-from pushplan.world.outline import transform, transform_outlines
+from pushplan.world.outline import transform
 from pushplan.world.robot import RobotModel
 from pushplan.world.static_map import StaticMap
 
@@ -111,9 +111,7 @@ class World(ArrayRecord, CheckedFields):
         Raises:
             InvalidInputError: if the goal is one for the robot.
         """
-        objects = self.movables
-        corners = transform_outlines(objects.poses, objects.drawn_vertices, objects.drawn_offsets)
-        return self.manipulation_goal.contains_each(corners, objects.drawn_offsets)
+        return self.movables.within(self.manipulation_goal.contains_each)
 
     def believing(self, fixed: ArrayLike) -> World:
         """The same scene with the objects flagged in (K,) held not to move, and no others."""
@@ -187,6 +185,6 @@ class World(ArrayRecord, CheckedFields):
 @functools.lru_cache(maxsize=8)
 def _with_objects(static: StaticMap, objects: Movables) -> StaticMap:
     """A map with objects among what is static; the same one for the same objects."""
-    outlines = [objects.outline_world(k) for k in range(len(objects))]
-    polygons = (*static.polygons, *outlines)
+    parts = [part for k in range(len(objects)) for part in objects.parts_world(k)]
+    polygons = (*static.polygons, *parts)
     return StaticMap(polygons, static.segments, static.radii, static.bounds)

@@ -11,21 +11,17 @@ std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 }  // namespace
 
 IceContacts::IceContacts(const IceBodies& bodies, const IceSettings& settings)
-    : bodies_(bodies), settings_(settings), most_points_(24 * bodies.radii.size() + 64) {
+    : bodies_(bodies), settings_(settings), most_points_(24 * at(bodies.floes.parts.count()) + 64) {
   hull_.resize(bodies.hull.vertices.size());
-  corners_.resize(bodies.floes.vertices.size());
+  corners_.resize(bodies.floes.parts.vertices.size());
   moves_.resize(bodies.radii.size());
   state_.resize(bodies.radii.size());
   points_.reserve(most_points_);
 }
 
-std::span<Vec2> IceContacts::corners(Index k) {
-  const auto& offsets = bodies_.floes.offsets;
-  return std::span(corners_).subspan(at(offsets[at(k)]), at(offsets[at(k) + 1] - offsets[at(k)]));
-}
-
 void IceContacts::place(Index k, const Pose& pose) {
-  transform(pose, bodies_.floes[k], corners(k).data());
+  const auto [first, count] = bodies_.floes.corners(k);
+  transform(pose, bodies_.floes.parts.vertices.subspan(first, count), corners_.data() + first);
 }
 
 void IceContacts::place(std::span<const Pose> poses) {
@@ -67,10 +63,14 @@ void IceContacts::meet_neighbours(Index k, std::span<const Pose> poses) {
     const double reach = bodies_.radii[j] + bodies_.radii[at(k)] + settings_.step;
     if (dx * dx + dy * dy >= reach * reach) continue;
     const Index other = static_cast<Index>(j);
-    const Contacts found = near_contacts(corners(k), corners(other), settings_.step);
-    if (found.count == 0) continue;
-    add(k, other, found, centre, poses);
-    if (state_[j] == State::kResting) state_[j] = State::kTouched;
+    for (Index p = bodies_.floes.begin(k); p < bodies_.floes.end(k); ++p) {
+      for (Index q = bodies_.floes.begin(other); q < bodies_.floes.end(other); ++q) {
+        const Contacts found = near_contacts(part(p), part(q), settings_.step);
+        if (found.count == 0) continue;
+        add(k, other, found, centre, poses);
+        if (state_[j] == State::kResting) state_[j] = State::kTouched;
+      }
+    }
   }
 }
 
@@ -87,10 +87,12 @@ void IceContacts::meet_hull(const Pose& here, std::span<const Pose> poses) {
     if (dx * dx + dy * dy >= reach * reach) continue;
     const Index floe = static_cast<Index>(k);
     for (Index piece = 0; piece < pieces.count(); ++piece) {
-      const Contacts found = near_contacts(pieces[piece], corners(floe), settings_.step);
-      if (found.count == 0) continue;
-      add(kHull, floe, found, {here.x, here.y}, poses);
-      state_[k] = State::kTouched;
+      for (Index p = bodies_.floes.begin(floe); p < bodies_.floes.end(floe); ++p) {
+        const Contacts found = near_contacts(pieces[piece], part(p), settings_.step);
+        if (found.count == 0) continue;
+        add(kHull, floe, found, {here.x, here.y}, poses);
+        state_[k] = State::kTouched;
+      }
     }
   }
 }

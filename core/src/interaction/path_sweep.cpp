@@ -15,15 +15,20 @@ class ChosenFloes {
  public:
   ChosenFloes(const IceBodies& all, std::span<const Index> chosen) {
     offsets_.push_back(0);
+    first_.push_back(0);
     for (const Index k : chosen) {
-      const Polygon floe = all.floes[k];
-      vertices_.insert(vertices_.end(), floe.begin(), floe.end());
-      offsets_.push_back(static_cast<Index>(vertices_.size()));
+      for (Index p = all.floes.begin(k); p < all.floes.end(k); ++p) {
+        const Polygon part = all.floes.parts[p];
+        vertices_.insert(vertices_.end(), part.begin(), part.end());
+        offsets_.push_back(static_cast<Index>(vertices_.size()));
+      }
+      first_.push_back(static_cast<Index>(offsets_.size()) - 1);
       radii_.push_back(all.radii[at(k)]);
       masses_.push_back(all.masses[at(k)]);
       inverse_gyration_.push_back(all.inverse_gyration[at(k)]);
     }
-    bodies = {all.hull, all.hull_radius, {vertices_, offsets_}, radii_, masses_, inverse_gyration_};
+    const Compounds floes{{vertices_, offsets_}, first_};
+    bodies = {all.hull, all.hull_radius, floes, radii_, masses_, inverse_gyration_};
   }
   ChosenFloes(const ChosenFloes&) = delete;
   ChosenFloes& operator=(const ChosenFloes&) = delete;
@@ -33,6 +38,7 @@ class ChosenFloes {
  private:
   std::vector<Vec2> vertices_;
   std::vector<Index> offsets_;
+  std::vector<Index> first_;
   std::vector<double> radii_;
   std::vector<double> masses_;
   std::vector<double> inverse_gyration_;

@@ -32,7 +32,7 @@ QuasiStatic::QuasiStatic(const Bodies& bodies, const QuasiStaticSettings& settin
     : bodies_(bodies), settings_(settings) {
   const std::size_t count = bodies.radii.size();
   robot_.resize(bodies.robot.vertices.size());
-  outlines_.resize(bodies.objects.vertices.size());
+  corners_.resize(bodies.shapes.parts.vertices.size());
   active_.resize(count);
   before_.resize(count);
   saved_.resize(count);
@@ -40,14 +40,11 @@ QuasiStatic::QuasiStatic(const Bodies& bodies, const QuasiStaticSettings& settin
   unused_.resize(count);
 }
 
-std::span<Vec2> QuasiStatic::outline(Index k) {
-  const auto& offsets = bodies_.objects.offsets;
-  return std::span(outlines_).subspan(at(offsets[at(k)]), at(offsets[at(k) + 1] - offsets[at(k)]));
-}
-
 /// Works out the corners of object k in the world frame.
 void QuasiStatic::place(Index k, std::span<const Pose> poses) {
-  transform(poses[at(k)], bodies_.objects[k], outline(k).data());
+  const auto [first, count] = bodies_.shapes.corners(k);
+  transform(poses[at(k)], bodies_.shapes.parts.vertices.subspan(first, count),
+            corners_.data() + first);
 }
 
 /// Makes every object nearby whose disc comes within `reach` of a point.
@@ -93,16 +90,20 @@ void QuasiStatic::widen(Index k, std::span<const Pose> poses) {
 
 /// Moves object k out of a piece of the robot or of a wall. Returns the deepest overlap found.
 double QuasiStatic::push_out(const Push& push, Index k, std::span<Pose> poses) {
-  const Contacts found = contacts(push.piece, outline(k));
-  if (found.count == 0) return 0.0;
-  Pose fixed{0.0, 0.0, 0.0};
-  const MovedBody body{poses[at(k)], 1.0, bodies_.inverse_gyration[at(k)]};
-  const double pushed = separate(found, {fixed, 0.0, 0.0}, body);
-  if (push.friction > 0.0) {
-    drag_along(found, push.friction * pushed, push.from, push.to, before_[at(k)], body);
+  double deepest = 0.0;
+  for (Index p = bodies_.shapes.begin(k); p < bodies_.shapes.end(k); ++p) {
+    const Contacts found = contacts(push.piece, part(p));
+    if (found.count == 0) continue;
+    Pose fixed{0.0, 0.0, 0.0};
+    const MovedBody body{poses[at(k)], 1.0, bodies_.inverse_gyration[at(k)]};
+    const double pushed = separate(found, {fixed, 0.0, 0.0}, body);
+    if (push.friction > 0.0) {
+      drag_along(found, push.friction * pushed, push.from, push.to, before_[at(k)], body);
+    }
+    place(k, poses);
+    deepest = std::max(deepest, depth_of(found));
   }
-  place(k, poses);
-  return depth_of(found);
+  return deepest;
 }
 
 double QuasiStatic::against_robot(Index k, const Pose& from, const Pose& to,
@@ -146,18 +147,24 @@ double QuasiStatic::against_objects(Index i, std::span<Pose> poses) {
     if (other == k || dx * dx + dy * dy >= reach * reach) continue;
     ++tests_;
     place(other, poses);
-    const Contacts found = contacts(outline(k), outline(other));
-    if (found.count == 0) continue;
-    const double depth = depth_of(found);
-    if (depth <= settings_.tolerance) continue;
-    const auto end = active_.begin() + count_;
-    if (std::find(active_.begin(), end, other) == end) {
-      before_[at(other)] = poses[at(other)];
-      active_[at(count_++)] = other;
+    const auto& shapes = bodies_.shapes;
+    for (Index p = shapes.begin(k); p < shapes.end(k); ++p) {
+      for (Index q = shapes.begin(other); q < shapes.end(other); ++q) {
+        const Contacts found = contacts(part(p), part(q));
+        if (found.count == 0) continue;
+        const double depth = depth_of(found);
+        if (depth <= settings_.tolerance) continue;
+        const auto end = active_.begin() + count_;
+        if (std::find(active_.begin(), end, other) == end) {
+          before_[at(other)] = poses[at(other)];
+          active_[at(count_++)] = other;
+        }
+        deepest = std::max(deepest, depth);
+        separate(found, body(k), body(other));
+        place(k, poses);
+        place(other, poses);
+      }
     }
-    deepest = std::max(deepest, depth);
-    separate(found, body(k), body(other));
-    place(k, poses);
   }
   return deepest;
 }

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pushplan.core import envs as core
-from pushplan.core import geometry
+from pushplan.geometry import gyration_squares
 from pushplan.envs.simulators.base import Materials
 from pushplan.world import World
 from pushplan.world.checks import FloatArray, IntArray
@@ -30,10 +30,7 @@ class Momentum:
     def of(cls, world: World, materials: Materials) -> Momentum:
         """For the robot and all objects of a world."""
         movables = world.movables
-        moments = [
-            mass * geometry.polygon_inertia(movables.drawn_outline(k))
-            for k, mass in enumerate(movables.masses)
-        ]
+        moments = movables.masses * gyration_squares(movables)
         inertia = np.ones((1 + len(movables), 2))
         inertia[1:, 0] = movables.masses
         inertia[1:, 1] = moments

@@ -15,7 +15,7 @@ from pushplan.envs.simulators.mujoco_options import MujocoOptions
 from pushplan.envs.simulators.mujoco_shapes import (
     add_geom,
     add_prism,
-    prism_inertia,
+    prisms_inertia,
     rgba,
     set_mass,
 )
@@ -197,7 +197,7 @@ def _add_robot(
         mass = robot.mass - 2.0 * (_WHEEL_MASS * robot.mass)
         ahead = _BALANCE * caster_position(robot)
         middle = [ahead, centroid(hull)[1], _MASS_HEIGHT * height - ground]
-    set_mass(body, hull, height, mass, middle)
+    set_mass(body, [hull], height, mass, middle)
     for i, part in enumerate(robot.contact_parts):
         top = solids.bumper_height if i else height
         color = palette.bumper if i else palette.robot
@@ -261,7 +261,8 @@ def _add_object(
             body.add_joint(type=kind, axis=axis)
     else:
         body.add_freejoint()
-    set_mass(body, outline, solids.object_height, mass, [0.0, 0.0, 0.0])
+    pieces = movables.contact_pieces(k)
+    set_mass(body, pieces, solids.object_height, mass, [0.0, 0.0, 0.0])
     low = -half
     if wheeled:
         radius = ball_radius(outline, solids)
@@ -271,7 +272,8 @@ def _add_object(
             pos = [*(0.75 * corner), radius - half]
             add_geom(spec, body, ball, "sphere", [radius, 0.0, 0.0], pos, "caster")
     color = (palette.wheeled if wheeled else palette.box)[0]
-    add_prism(spec, body, name, outline, low, half, "object", color)
+    for i, part in enumerate(movables.parts(k)):
+        add_prism(spec, body, f"{name} part {i}" if i else name, part, low, half, "object", color)
 
 
 def _caster_corners(outline: FloatArray) -> FloatArray:
@@ -293,7 +295,7 @@ def _set_damping(model: Any, movables: Movables, materials: Materials) -> None:
         first = int(model.body(f"object {k}").dofadr[0])
         damping = model.dof_damping[first : first + 6]
         if movables.wheeled[k]:
-            _, inertia = prism_inertia(movables.outline(k), 0.0, float(mass))
+            _, inertia = prisms_inertia(movables.contact_pieces(k), 0.0, float(mass))
             damping[:2] = mass / materials.rolling_time
             damping[5] = inertia[2] / materials.rolling_time
         if movables.fixed[k]:

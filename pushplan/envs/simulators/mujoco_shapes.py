@@ -124,6 +124,26 @@ def _prism_faces(count: int) -> FloatArray:
     return faces
 
 
+def prisms_inertia(
+    pieces: Sequence[FloatArray], height: float, mass: float
+) -> tuple[FloatArray, FloatArray]:
+    """`prism_inertia` of a body of several prisms that do not overlap, (N, 2) corners each [m]."""
+    if len(pieces) == 1:
+        return prism_inertia(pieces[0], height, mass)
+    areas = np.array([signed_area(piece) for piece in pieces])
+    each = [
+        prism_inertia(piece, height, part)
+        for piece, part in zip(pieces, mass * areas / areas.sum(), strict=True)
+    ]
+    centers = np.array([center for center, _ in each])
+    center = areas @ centers / areas.sum()
+    inertia = sum(own for _, own in each)
+    shares = mass * areas / areas.sum()
+    x, y = (centers - center).T
+    apart = [shares @ y**2, shares @ x**2, shares @ (x**2 + y**2), -(shares @ (x * y)), 0.0, 0.0]
+    return center, inertia + np.array(apart)
+
+
 def prism_inertia(outline: FloatArray, height: float, mass: float) -> tuple[FloatArray, FloatArray]:
     """Centre of mass and inertia of an upright prism of uniform density.
 
@@ -150,12 +170,12 @@ def prism_inertia(outline: FloatArray, height: float, mass: float) -> tuple[Floa
 
 
 def set_mass(
-    body: Any, outline: FloatArray, height: float, mass: float, center: Sequence[float]
+    body: Any, pieces: Sequence[FloatArray], height: float, mass: float, center: Sequence[float]
 ) -> None:
-    """Give a body the mass and the inertia of a prism, about a centre of mass (3,) [m]."""
+    """Give a body the mass and the inertia of prisms, about a centre of mass (3,) [m]."""
     body.mass = mass
     body.ipos = center
-    body.fullinertia = prism_inertia(outline, height, mass)[1]
+    body.fullinertia = prisms_inertia(pieces, height, mass)[1]
     body.explicitinertial = True
 
 

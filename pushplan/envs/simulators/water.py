@@ -8,9 +8,10 @@ import numpy as np
 
 from pushplan.core import envs as core
 from pushplan.core import geometry
-from pushplan.world import World
+from pushplan.world import Movables, World
 from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, PositiveFloat
 from pushplan.world.checks import FloatArray, frozen
+from pushplan.world.outline import flatten
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ class Water(CheckedFields):
         out = np.zeros((1 + len(movables), 4))
         out[0, 0] = world.robot.mass / self.robot_surge_time
         out[0, 2] = world.robot.mass * _hull_inertia(world) / self.robot_yaw_time
-        shape = core.flow_shapes(movables.vertices, movables.offsets)
+        shape = _flow_shapes(movables)
         form = 0.5 * self.density * self.object_form_drag * self.object_draught
         skin = self.density * self.object_skin_drag
         out[1:, 1] = form * shape[:, 0] + skin * shape[:, 1]
@@ -56,6 +57,17 @@ class Water(CheckedFields):
         out[1:, 0] = self.ambient_speed * out[1:, 1]
         out[1:, 2] = self.ambient_speed / np.sqrt(shape[:, 1] / np.pi) * out[1:, 3]
         return frozen(out)
+
+
+def _flow_shapes(movables: Movables) -> FloatArray:
+    """(K, 4) as `FlowShape` of the core: edges are those of the hulls, areas those of the parts."""
+    shape = core.flow_shapes(movables.vertices, movables.offsets)
+    if movables.is_compound:
+        pieces = [movables.contact_pieces(k) for k in range(len(movables))]
+        each = core.flow_shapes(*flatten([piece for some in pieces for piece in some]))
+        first = np.cumsum([0, *map(len, pieces)])[:-1]
+        shape[:, [1, 3]] = np.add.reduceat(each[:, [1, 3]], first)
+    return shape
 
 
 def _hull_inertia(world: World) -> float:

@@ -258,8 +258,7 @@ def those_inside(
     """
     if len(ids) < len(movables):
         movables = movables.select(np.isin(movables.ids, ids))
-    corners = transform_outlines(poses, movables.drawn_vertices, movables.drawn_offsets)
-    inside: IntArray = ids[receptacle.contains_each(corners, movables.drawn_offsets)]
+    inside: IntArray = ids[movables.within(receptacle.contains_each, poses)]
     return inside
 
 

@@ -61,8 +61,8 @@ def _components(world: World, radius: float) -> FreeComponents:
     objects = world.movables
     static = world.static
     grid = Grid.cover(static.bounds, _CELL * world.robot.circumscribed_radius)
-    outlines = [objects.outline_world(k) for k in range(len(objects))]
-    everything = StaticMap.build([*static.polygons, *outlines], bounds=static.bounds)
+    parts = [part for k in range(len(objects)) for part in objects.parts_world(k)]
+    everything = StaticMap.build([*static.polygons, *parts], bounds=static.bounds)
     return FreeComponents.of(grid, clearance_field(everything, grid), radius)
 
 

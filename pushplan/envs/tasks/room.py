@@ -168,7 +168,7 @@ class RoomTask(Task):
         floor = shapely.box(*world.static.bounds)
         movables = world.movables
         outlines = [list(world.robot.contact_parts)]
-        outlines += [[movables.outline(k)] for k in range(len(movables))]
+        outlines += [list(movables.parts(k)) for k in range(len(movables))]
         poses = np.vstack([world.robot_pose, movables.poses])
         of_objects = self.goal_kind == "objects"
         radii = [world.robot.circumscribed_radius, *movables.radii]

@@ -14,7 +14,7 @@ import numpy as np
 from pushplan.evaluation.statistics.stored_run import StoredRun
 from pushplan.evaluation.store.rows import ResultRow
 from pushplan.files.output_files import make_folder, write_atomic
-from pushplan.world import Episode, GoalDisc, GoalLine, SchemaError
+from pushplan.world import Episode, GoalDisc, GoalLine, Movables, SchemaError
 from pushplan.world.checks import FloatArray
 from pushplan.world.stored.recorded_plans import thinned
 
@@ -100,7 +100,15 @@ def _scene(episode: Episode) -> dict[str, Any]:
         "segments": [_flat(segment) for segment in segments],
         "goal": shown,
         "robot": [_flat(part) for part in world.robot.contact_parts],
-        "objects": [_flat(world.movables.outline(k)) for k in range(len(world.movables))],
+        "objects": [_drawn(world.movables, k) for k in range(len(world.movables))],
+    }
+
+
+def _drawn(objects: Movables, k: int) -> dict[str, Any]:
+    """What is filled of an object, and the lines around it."""
+    return {
+        "parts": [_flat(part) for part in objects.parts(k)],
+        "rings": [_flat(ring) for ring in objects.rings(k)],
     }
 
 

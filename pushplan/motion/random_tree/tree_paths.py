@@ -21,7 +21,6 @@ from pushplan.motion.speed_profile import TIGHTEST
 from pushplan.motion.start_turn import drive_to_turn, start_turn
 from pushplan.world import Drive
 from pushplan.world.checks import FloatArray
-from pushplan.world.outline import unflatten
 from pushplan.world.polyline import path_length
 
 _COARSE_PATH_FRACTION = 0.8  # of the targets, that are near the coarse path at first
@@ -115,7 +114,7 @@ class TreePaths:
         among = room.walls
         shape = room.footprint
         if np.isinf(push_weight):
-            boxes = unflatten(world.movables.vertices_world, world.movables.offsets)
+            boxes = world.movables.every_part_world
             among = obstacles(keep_out(world), boxes)
             if not core.CollisionChecker(shape, among).is_free(improver.lead.pose):
                 return None  # the robot touches an object already: only pushing helps

@@ -77,11 +77,13 @@ class Movability:
         found: set[int] = set()
         heading = np.array([math.cos(world.robot_pose[2]), math.sin(world.robot_pose[2])])
         for k, number in enumerate(world.movables.ids.tolist()):
-            outline = np.ascontiguousarray(world.movables.outline_world(k))
-            ahead = float(((outline - world.robot_pose[:2]) @ heading).max()) > 0.0
+            outlines = [np.ascontiguousarray(part) for part in world.movables.parts_world(k)]
+            corners = np.concatenate(outlines)
+            ahead = float(((corners - world.robot_pose[:2]) @ heading).max()) > 0.0
             gap = min(
                 convex_distance(np.ascontiguousarray(part), outline)
                 for part in world.robot_outline_world()
+                for outline in outlines
             )
             if ahead and gap < _TOUCH * self._size:
                 found.add(number)

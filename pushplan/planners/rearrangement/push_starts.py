@@ -98,9 +98,9 @@ class PushStarts:
         movables = self.movables
         away = np.hypot(*(self.poses[:, :2] - pose[:2]).T)
         for k in np.flatnonzero(away < self.robot.circumscribed_radius + movables.radii).tolist():
-            outline = np.ascontiguousarray(movables.outline_world(k))
+            outlines = [np.ascontiguousarray(part) for part in movables.parts_world(k)]
             for part in self.robot.contact_parts:
                 body = np.ascontiguousarray(transform(pose, part))
-                if geometry.convex_penetration(body, outline)[0] > 0.0:
+                if any(geometry.convex_penetration(body, o)[0] > 0.0 for o in outlines):
                     return False
         return True

@@ -73,7 +73,7 @@ class GeometricRRT:
         config = self.config
         call = PlanningCall(world, stop, rng, MaxIterations(4 * config.pass_iterations))
         objects = world.movables
-        boxes = [objects.outline_world(k) for k in range(len(objects))]
+        boxes = [part for k in range(len(objects)) for part in objects.parts_world(k)]
         iterations = 0
         if start_margin(world, 0.0) is None:
             return call.result(PlanStatus.START_BLOCKED)

@@ -15,7 +15,6 @@ from pushplan.motion.speed_profile import check_turns
 from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
 from pushplan.world import GoalLine, InvalidInputError, Movables, PlanStatus, World
 from pushplan.world.checks import FloatArray, IntArray
-from pushplan.world.outline import areas_and_centroids
 
 STEEPEST = math.radians(80.0)
 """Greatest angle between the ship and the direction ahead in the table of costs to go."""
@@ -207,7 +206,7 @@ def _costs_to_go(
         weight=config.push_weight,
         radius=radius,
     )
-    radii = np.sqrt(areas_and_centroids(objects.vertices, objects.offsets)[0] / np.pi)
+    radii = np.sqrt(objects.contact_areas / np.pi)
     costs.fill_field(floes, radii, objects.masses, 0.5 * float(np.ptp(vertices[:, 1])))
     costs.fill_table()
     return costs

@@ -36,9 +36,12 @@ class MapPropagator:
         self._corner = self._cell * np.floor(low / self._cell)
         columns, rows = np.ceil((high - self._corner) / self._cell).astype(int)
         self._start = np.zeros((max(rows, PATCH_CELLS), max(columns, PATCH_CELLS)), np.float32)
-        shapes = (view.objects.vertices, view.objects.offsets)
+        objects = view.objects
+        floes = view.floes[objects.part_owners]
         frame = np.array([*self._corner, 0.0])
-        core.cover_objects(view.floes, *shapes, frame, self._cell, self._start)
+        core.cover_objects(
+            floes, objects.part_vertices, objects.part_offsets, frame, self._cell, self._start
+        )
 
     def start(self) -> Patch:
         """The map now."""

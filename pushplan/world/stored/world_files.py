@@ -14,10 +14,10 @@ import numpy as np
 from pushplan.errors import InvalidInputError, SchemaError, short, unknown_name_message
 from pushplan.files.safe_files import known_keys, read_data
 from pushplan.files.safe_yaml import dump
-from pushplan.world.checks import FloatArray, array, boolean, integer, number, word
+from pushplan.world.checks import array, boolean, integer, number, word
+from pushplan.world.convex_shapes import ConvexParts, areas_and_centres, disjoint, shapes_of
 from pushplan.world.goals import ClearanceArea, Goal, GoalDisc, GoalLine, Receptacle
 from pushplan.world.movables import Movables
-from pushplan.world.outline import convex_outline, signed_area, unflatten
 from pushplan.world.robot import RobotModel
 from pushplan.world.scene import World
 from pushplan.world.static_map import StaticMap
@@ -37,6 +37,9 @@ _LEFT_OUT = {
     "max_turn_acceleration": math.inf,
     "contact_radius": 0.0,
     "wheel_parts": 0,
+    "outline": None,
+    "parts": None,
+    "gyration_radius": 0.0,
     "fixed": False,
     "margin": 0.0,
 }
@@ -60,8 +63,10 @@ def world_to_dict(world: World) -> dict[str, Any]:
         "id": objects.ids,
         "pose": objects.poses,
         "twist": objects.twists,
-        "outline": unflatten(objects.drawn_vertices, objects.drawn_offsets),
+        "outline": [_one_or_none(objects.drawn_parts(k)) for k in range(len(objects))],
+        "parts": [_if_several(objects.drawn_parts(k)) for k in range(len(objects))],
         "contact_radius": objects.contact_radii,
+        "gyration_radius": objects.gyration_radii,
         "mass": objects.masses,
         "wheeled": objects.wheeled,
         "fixed": objects.fixed,
@@ -97,8 +102,20 @@ def _plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 
+def _one_or_none(parts: ConvexParts) -> Any:
+    return parts[0].tolist() if len(parts) == 1 else None
+
+
+def _if_several(parts: ConvexParts) -> Any:
+    return [part.tolist() for part in parts] if len(parts) > 1 else None
+
+
 def _written(values: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in values.items() if value != _LEFT_OUT.get(key)}
+    return {
+        key: value
+        for key, value in values.items()
+        if key not in _LEFT_OUT or value != _LEFT_OUT[key]
+    }
 
 
 def world_from_dict(data: object, folder: str | Path = ".") -> World:
@@ -207,10 +224,18 @@ _COLUMNS: dict[str, Callable[[str, Any], Any]] = {
     "wheeled": boolean,
     "fixed": boolean,
     "contact_radius": partial(number, low=0.0),
+    "gyration_radius": partial(number, low=0.0),
     "id": partial(integer, low=-(2**63), high=2**63 - 1),
 }
 """Checks of what a file says of an object, beside its outline."""
-_AT_REST = {"twist": [0.0, 0.0, 0.0], "wheeled": False, "fixed": False, "contact_radius": 0.0}
+_AT_REST = {
+    "twist": [0.0, 0.0, 0.0],
+    "wheeled": False,
+    "fixed": False,
+    "contact_radius": 0.0,
+    "gyration_radius": 0.0,
+}
+_SHAPES = ("polygon", "outline", "parts")
 
 
 def movables_from_list(data: object) -> Movables:
@@ -219,32 +244,34 @@ def movables_from_list(data: object) -> Movables:
     Raises:
         SchemaError, InvalidInputError: as `world_from_dict`.
     """
-    outlines: list[FloatArray] = []
-    columns: dict[str, list[Any]] = {key: [] for key in _COLUMNS}
-    for i, item in enumerate(_list("movables", data)):
+    items = _list("movables", data)
+    kinds = []
+    for i, item in enumerate(items):
         name = f"movables[{i}]"
-        known_keys(name, item, (*_COLUMNS, "outline", "polygon"), ())
-        if ("polygon" in item) == ("outline" in item) or ("outline" in item) != ("pose" in item):
+        known_keys(name, item, (*_COLUMNS, *_SHAPES), ())
+        kinds += [kind for kind in _SHAPES if kind in item]
+        if len(kinds) != i + 1 or (kinds[i] == "polygon") == ("pose" in item):
             raise SchemaError(
-                f"{name} needs either 'polygon' (world frame) or 'outline' (body frame) and 'pose'"
+                f"{name} needs either 'polygon' (world frame), or 'pose' and 'outline' or 'parts' "
+                "(body frame)"
             )
-        given = {"id": i, **_AT_REST, **item}
-        if "polygon" in item:
-            corners = convex_outline(f"{name}.polygon", item["polygon"])
-            shape = Movables.from_polygons([corners])
-            outline = shape.outline(0)
-            given["pose"] = shape.poses[0]
-        else:
-            outline = convex_outline(f"{name}.outline", item["outline"])
-        if given.get("mass") is None:
-            given["mass"] = signed_area(outline)
-        outlines.append(outline)
-        for key, check in _COLUMNS.items():
-            columns[key].append(check(f"{name}.{key}", given[key]))
-    if not outlines:
+    if not items:
         return Movables.empty()
+    given_shapes = [item[kind] for item, kind in zip(items, kinds, strict=True)]
+    shapes = shapes_of("movables", given_shapes, lambda i: f"movables[{i}].{kinds[i]}")
+    areas, centres = areas_and_centres([disjoint(parts) for parts in shapes])
+    columns: dict[str, list[Any]] = {key: [] for key in _COLUMNS}
+    for i, item in enumerate(items):
+        given = {"id": i, **_AT_REST, **item}
+        if kinds[i] == "polygon":
+            given["pose"] = [*centres[i], 0.0]
+            shapes[i] = tuple(part - centres[i] for part in shapes[i])
+        if given.get("mass") is None:
+            given["mass"] = float(areas[i])
+        for key, check in _COLUMNS.items():
+            columns[key].append(check(f"movables[{i}].{key}", given[key]))
     return Movables.from_outlines(
-        outlines,
+        shapes,
         columns["pose"],
         masses=columns["mass"],
         wheeled=columns["wheeled"],
@@ -252,6 +279,7 @@ def movables_from_list(data: object) -> Movables:
         ids=columns["id"],
         contact_radii=columns["contact_radius"],
         fixed=columns["fixed"],
+        gyration_radii=columns["gyration_radius"],
     )
 
 

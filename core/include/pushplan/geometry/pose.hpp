@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 #include <span>
+#include <utility>
 
 #include "pushplan/arithmetic.hpp"
 #include "pushplan/array.hpp"
@@ -59,6 +60,22 @@ struct Polygons {
     const auto k = static_cast<std::size_t>(i);
     return vertices.subspan(static_cast<std::size_t>(offsets[k]),
                             static_cast<std::size_t>(offsets[k + 1] - offsets[k]));
+  }
+};
+
+/// K bodies, each the union of convex parts.
+struct Compounds {
+  Polygons parts;                // in the frames of their bodies
+  std::span<const Index> first;  // (K + 1,) number of the first part of each body, then of all
+
+  Index count() const { return static_cast<Index>(first.size()) - 1; }
+  Index begin(Index k) const { return first[static_cast<std::size_t>(k)]; }
+  Index end(Index k) const { return first[static_cast<std::size_t>(k) + 1]; }
+  /// Where the corners of body k are in `parts.vertices`: the first, and how many.
+  std::pair<std::size_t, std::size_t> corners(Index k) const {
+    const Index from = parts.offsets[static_cast<std::size_t>(begin(k))];
+    const Index to = parts.offsets[static_cast<std::size_t>(end(k))];
+    return {static_cast<std::size_t>(from), static_cast<std::size_t>(to - from)};
   }
 };
 

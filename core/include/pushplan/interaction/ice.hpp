@@ -21,7 +21,7 @@ namespace pushplan {
 struct IceBodies {
   Polygons hull;                             // convex parts in its body frame
   double hull_radius;                        // circumscribed [m]
-  Polygons floes;                            // outlines in their body frames
+  Compounds floes;                           // in their body frames
   std::span<const double> radii;             // (K,) circumscribed radii [m]
   std::span<const double> masses;            // (K,) [kg]
   std::span<const double> inverse_gyration;  // (K,) 1 / c^2 [1/m^2], c^2 being inertia over mass
@@ -81,12 +81,12 @@ class IceContacts {
   void meet_neighbours(Index k, std::span<const Pose> poses);
   void add(Index a, Index b, const Contacts& found, Vec2 centre_a, std::span<const Pose> poses);
   void relax(const Pose& hull_move);
-  std::span<Vec2> corners(Index k);
+  Polygon part(Index p) const { return Polygons{corners_, bodies_.floes.parts.offsets}[p]; }
 
   IceBodies bodies_;
   IceSettings settings_;
   std::vector<Vec2> hull_;     // corners in the world frame
-  std::vector<Vec2> corners_;  // of the floes, kept up to date
+  std::vector<Vec2> corners_;  // of the floes' parts, kept up to date
   std::vector<Pose> moves_;    // displacement of each floe in this step
   std::vector<State> state_;
   std::vector<ContactPoint> points_;

@@ -21,7 +21,8 @@ struct Bodies {
   Polygons robot;       // convex parts in its body frame
   Index wall_parts;     // number of the first parts, which count at walls: all but the wheels
   double robot_radius;  // circumscribed [m]
-  Polygons objects;     // outlines in their body frames
+  Polygons objects;     // convex hulls in their body frames
+  Compounds shapes;     // the objects themselves
   std::span<const double> radii;             // (K,) circumscribed radii of the objects [m]
   std::span<const double> inverse_masses;    // (K,) [1/kg]
   std::span<const double> inverse_gyration;  // (K,) 1 / c^2 [1/m^2]
@@ -80,13 +81,13 @@ class QuasiStatic {
   double against_walls(Index k, std::span<Pose> poses);
   double against_objects(Index i, std::span<Pose> poses);
   double resolve(const Pose& from, const Pose& to, std::span<Pose> poses);
-  std::span<Vec2> outline(Index k);
+  Polygon part(Index p) const { return Polygons{corners_, bodies_.shapes.parts.offsets}[p]; }
   void place(Index k, std::span<const Pose> poses);
 
   Bodies bodies_;
   QuasiStaticSettings settings_;
   std::vector<Vec2> robot_;     // corners of the robot in the world frame
-  std::vector<Vec2> outlines_;  // of the objects
+  std::vector<Vec2> corners_;   // of the objects' parts
   std::vector<Index> active_;   // objects that may move in this step: the first `count_`
   Index count_ = 0;
   std::vector<Pose> before_;    // poses before this step

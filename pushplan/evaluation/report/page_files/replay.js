@@ -151,8 +151,11 @@ function drawView({ canvas, box, replay }) {
     for (const points of parts) filled(points, fill, stroke);
     pen.restore();
   };
-  replay.objects.forEach((points, i) => placed([points], pose(i + 1, 0), null, COLOURS.ghost));
-  replay.objects.forEach((points, i) => placed([points], pose(i + 1, k), `${COLOURS.object}cc`, COLOURS.edge));
+  replay.objects.forEach(({ rings }, i) => placed(rings, pose(i + 1, 0), null, COLOURS.ghost));
+  replay.objects.forEach(({ parts, rings }, i) => {
+    placed(parts, pose(i + 1, k), `${COLOURS.object}cc`, null);
+    placed(rings, pose(i + 1, k), null, COLOURS.edge);
+  });
   pen.beginPath();
   for (let frame = 0; frame <= k; frame++) pen.lineTo(...pose(0, frame).slice(0, 2));
   pen.strokeStyle = COLOURS.trail; pen.stroke();
@@ -162,7 +165,7 @@ function drawView({ canvas, box, replay }) {
     pen.beginPath();
     for (let i = 0; i < plan.path.length; i += 2) pen.lineTo(plan.path[i], plan.path[i + 1]);
     pen.strokeStyle = COLOURS.plan; pen.stroke();
-    plan.moved.forEach((body, i) => placed([replay.objects[body]], plan.ends.slice(3 * i, 3 * i + 3), null, COLOURS.prediction));
+    plan.moved.forEach((body, i) => placed(replay.objects[body].rings, plan.ends.slice(3 * i, 3 * i + 3), null, COLOURS.prediction));
     pen.setLineDash([]);
   }
   const [x, y, angle] = pose(0, k);

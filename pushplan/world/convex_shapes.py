@@ -1,0 +1,70 @@
+"""Shapes as unions of convex parts; Shapely is loaded only for those that are not convex."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from pushplan.errors import InvalidInputError
+from pushplan.world.checks import FloatArray
+from pushplan.world.outline import areas_and_centroids, convex_outlines, flatten
+
+ConvexParts = tuple[FloatArray, ...]
+"""Convex outlines, counter-clockwise, each (N, 2) [m]; the shape is their union."""
+
+
+def shapes_of(
+    name: str, shapes: Sequence[Any], called: Callable[[int], str] | None = None
+) -> list[ConvexParts]:
+    """The convex parts of each of some shapes.
+
+    Warns once, by an `OutlineWarning`, where outlines were repaired or have changed.
+
+    Args:
+        name: of the shapes, for messages.
+        shapes: of each the corners (N, 2) [m], a polygon of Shapely, or a list of such outlines.
+        called: what messages call shape i; the name and i if None.
+
+    Raises:
+        InvalidInputError: as `pushplan.world.outline_repair.outline_parts`.
+    """
+    try:
+        return [(outline,) for outline in convex_outlines(name, shapes)]  # nearly always
+    except InvalidInputError:
+        from pushplan.world.outline_repair import cut_outlines
+
+        return cut_outlines(name, shapes, called or (lambda i: f"{name} {i}"))
+
+
+def disjoint(parts: ConvexParts) -> ConvexParts:
+    """Convex pieces that do not overlap, with the union of some convex parts."""
+    if len(parts) == 1:
+        return parts
+    from pushplan.world.outline_repair import disjoint_pieces
+
+    return disjoint_pieces(parts)
+
+
+def rings_of(parts: ConvexParts) -> tuple[FloatArray, ...]:
+    """Outlines (N, 2) [m] of the union of some convex parts, those of its holes too."""
+    if len(parts) == 1:
+        return parts
+    from pushplan.world.outline_repair import union_rings
+
+    return union_rings(parts)
+
+
+def areas_and_centres(pieces: Sequence[ConvexParts]) -> tuple[FloatArray, FloatArray]:
+    """Areas (K,) [m²] and centroids (K, 2) [m] of shapes made of pieces that do not overlap."""
+    counts = np.array([len(each) for each in pieces], dtype=np.int64)
+    vertices, offsets = flatten([piece for each in pieces for piece in each])
+    areas, centres = areas_and_centroids(vertices, offsets)
+    if (counts == 1).all():
+        return areas, centres
+    first = np.cumsum(counts) - counts
+    total = np.add.reduceat(areas, first)
+    middles = np.add.reduceat(areas[:, None] * centres, first) / total[:, None]
+    middles[counts == 1] = centres[first[counts == 1]]
+    return total, middles

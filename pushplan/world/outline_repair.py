@@ -1,0 +1,255 @@
+"""Repair of outlines as sensors and other programs give them, and cuts into convex parts."""
+
+from __future__ import annotations
+
+import heapq
+import warnings
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+
+from pushplan.errors import InvalidInputError
+from pushplan.world.checks import FloatArray, array
+from pushplan.world.convex_shapes import ConvexParts
+from pushplan.world.outline import (
+    LARGEST_M,
+    convex_hull,
+    convex_outline,
+    counter_clockwise,
+    listed,
+    rounding_of,
+)
+
+MOST_CHANGE = 0.01
+"""Fraction of its area by which repair and cutting may change an outline."""
+_SMOOTHED = 0.003  # share of that for leaving out corners of outlines with many of them,
+_FILLED = 0.004  # and for filling dents, so that fewer parts are enough
+_FEW_CORNERS = 12  # outlines with no more than these keep all of them
+_TOLERANCES = (0.02, 0.01, 0.005, 0.002, 0.001)
+"""Distances from the outline [sizes of it] within which corners may be left out, tried in turn."""
+_SLIVER = 1e-6
+"""Pieces and parts below this fraction of the area are left out."""
+
+
+class OutlineWarning(UserWarning):
+    """Outlines were repaired, or have changed a little by being cut into convex parts."""
+
+
+@dataclass(frozen=True)
+class OutlineParts:
+    """A shape as the union of convex parts.
+
+    Args:
+        parts: convex outlines, counter-clockwise, each (N, 2) [m]. They may overlap a little.
+        change: area by which their union and the given shape differ, over the area of the shape.
+        repaired: True if the outline crossed or touched itself.
+    """
+
+    parts: ConvexParts
+    change: float
+    repaired: bool
+
+
+def outline_parts(name: str, shape: Any) -> OutlineParts:
+    """Repair one outline and cut it into convex parts.
+
+    Corners may go round either way and may be repeated. Spikes are left out, and loops where the
+    outline crosses itself are resolved by Shapely's `make_valid`.
+
+    Args:
+        name: of the outline, for messages.
+        shape: (N, 2) corners [m], or a polygon of Shapely, which may have holes.
+
+    Raises:
+        InvalidInputError: if it has no area, or if the parts differ from it by more than 1 % of it.
+    """
+    convex = _if_convex(name, shape)
+    if convex is not None:
+        return OutlineParts((convex,), 0.0, False)
+    given = _polygon(name, shape)
+    repaired = not given.is_valid
+    whole = _areal(shapely.make_valid(given, method="structure", keep_collapsed=False))
+    low_x, low_y, high_x, high_y = given.bounds
+    size = max(high_x - low_x, high_y - low_y)
+    if not whole.area > 1e-9 * size * size:
+        raise InvalidInputError(f"{name} must have an area, got {whole.area:g} m²")
+    unclear = 0.0
+    if repaired:  # loops count once by one rule, and are holes by the other
+        other = _areal(shapely.make_valid(given))
+        unclear = shapely.symmetric_difference(whole, other).area / whole.area
+    if unclear > MOST_CHANGE:
+        raise InvalidInputError(
+            f"{name} crosses itself: its area may be {other.area:.4g} or {whole.area:.4g} m², and "
+            f"at most {100 * MOST_CHANGE:g} % may be unclear"
+        )
+    parts = _merged(_triangles(_smoothed(whole, size)), _FILLED * whole.area)
+    union = shapely.union_all([shapely.Polygon(part) for part in parts])
+    change = unclear + shapely.symmetric_difference(union, whole).area / whole.area
+    if change > MOST_CHANGE:
+        raise InvalidInputError(
+            f"{name} must be a shape whose convex parts differ from it by at most "
+            f"{100 * MOST_CHANGE:g} % of its area, got {100 * change:.2g} %"
+        )
+    return OutlineParts(tuple(parts), change, repaired)
+
+
+def cut_outlines(
+    name: str, shapes: Sequence[Any], called: Callable[[int], str]
+) -> list[ConvexParts]:
+    """The convex parts of each of some shapes; see `pushplan.world.convex_shapes.shapes_of`."""
+    found = []
+    changed: list[OutlineParts] = []
+    for i, shape in enumerate(listed(name, shapes)):
+        if _is_list_of_outlines(shape):
+            cut = [outline_parts(f"{called(i)}, part {j}", each) for j, each in enumerate(shape)]
+        else:
+            cut = [outline_parts(called(i), shape)]
+        found.append(tuple(part for each in cut for part in each.parts))
+        changed += [each for each in cut if each.repaired or each.change > _SLIVER]
+    if changed:
+        most = max(each.change for each in changed)
+        warnings.warn(
+            f"{len(changed)} of {len(found)} outlines were repaired or lost small dents: their "
+            f"areas have changed by at most {100 * most:.2g} %",
+            OutlineWarning,
+            stacklevel=4,
+        )
+    return found
+
+
+def _is_list_of_outlines(shape: Any) -> bool:
+    if isinstance(shape, np.ndarray):
+        return shape.ndim == 3
+    if not isinstance(shape, list | tuple) or not shape:
+        return False
+    first = shape[0]
+    return isinstance(first, shapely.Geometry) or (
+        isinstance(first, list | tuple | np.ndarray) and len(first) > 0 and np.ndim(first[0]) == 1
+    )
+
+
+def disjoint_pieces(parts: ConvexParts) -> ConvexParts:
+    """Triangles (3, 2) [m] that do not overlap, with the union of some convex parts (N, 2) [m]."""
+    union = shapely.union_all([shapely.Polygon(part) for part in parts])
+    return tuple(counter_clockwise(triangle) for triangle in _triangles(_areal(union)))
+
+
+def union_rings(parts: ConvexParts) -> tuple[FloatArray, ...]:
+    """Outlines (N, 2) [m] of the union of some convex parts, those of its holes too."""
+    union = _areal(shapely.union_all([shapely.Polygon(part) for part in parts]))
+    rings = [ring for piece in union.geoms for ring in (piece.exterior, *piece.interiors)]
+    return tuple(shapely.get_coordinates(ring)[:-1] for ring in rings)
+
+
+def _polygon(name: str, shape: Any) -> Any:
+    """The shape as a polygon of Shapely, valid or not, with corners that count as different."""
+    if isinstance(shape, shapely.Geometry):
+        if shape.geom_type not in ("Polygon", "MultiPolygon") or shape.is_empty:
+            raise InvalidInputError(
+                f"{name} must be a polygon with an area, got {shape.geom_type} {shape.wkt[:40]}"
+            )
+        points = shapely.get_coordinates(shape)
+    else:
+        points = array(name, shape, (None, 2))
+    largest = float(np.abs(points).max(initial=0.0))
+    if not largest <= LARGEST_M:
+        raise InvalidInputError(f"{name} must lie within {LARGEST_M:g} m, got {largest:g} m")
+    if len(points) < 3:
+        raise InvalidInputError(f"{name} must have at least 3 corners, got {len(points)}")
+    if isinstance(shape, shapely.Geometry):
+        return shape
+    steps = np.roll(points, -1, axis=0) - points
+    kept = points[np.hypot(*steps.T) > rounding_of(points)]
+    if len(kept) < 3:
+        raise InvalidInputError(f"{name} must have at least 3 corners that differ")
+    return shapely.Polygon(kept)
+
+
+def _if_convex(name: str, shape: Any) -> FloatArray | None:
+    """The outline, if it is one ring and convex."""
+    ring = shape
+    if isinstance(shape, shapely.Geometry):
+        if shape.geom_type != "Polygon" or len(shape.interiors) or shape.is_empty:
+            return None
+        ring = shapely.get_coordinates(shape)
+    try:
+        return convex_outline(name, ring)
+    except InvalidInputError:
+        return None
+
+
+def _areal(shape: Any) -> Any:
+    """The pieces of a shape that have an area, without slivers."""
+    pieces = [one for one in shapely.get_parts([shape]) if one.geom_type == "Polygon"]
+    least = _SLIVER * sum(one.area for one in pieces)
+    return shapely.MultiPolygon([one for one in pieces if one.area > least])
+
+
+def _smoothed(whole: Any, size: float) -> Any:
+    """The shape with fewer corners, where it has many."""
+    if shapely.get_num_coordinates(whole) <= _FEW_CORNERS + 1:
+        return whole
+    for tolerance in _TOLERANCES:
+        less = shapely.simplify(whole, tolerance * size)
+        if shapely.symmetric_difference(whole, less).area <= _SMOOTHED * whole.area:
+            return _areal(less)
+    return whole
+
+
+def _triangles(shape: Any) -> list[FloatArray]:
+    pieces = shapely.get_parts(shapely.constrained_delaunay_triangles(shape))
+    return [shapely.get_coordinates(piece)[:3] for piece in pieces]
+
+
+def _merged(pieces: list[FloatArray], budget: float) -> list[FloatArray]:
+    """Few convex outlines whose union is that of convex pieces, up to an area `budget` [m²].
+
+    Neighbours are replaced by their hull, the pair first whose hull has the least area beyond
+    theirs: those that fit without a dent, as Hertel and Mehlhorn do, then those with a small one.
+    """
+    parts = dict(enumerate(pieces))
+    areas = {i: shapely.Polygon(piece).area for i, piece in parts.items()}
+    neighbours = _neighbours(pieces)
+    queue: list[tuple[float, int, int]] = []
+
+    def offer(pairs: Iterable[tuple[int, int]]) -> None:
+        for i, j in pairs:
+            hull = convex_hull(np.concatenate([parts[i], parts[j]]))
+            gain = shapely.Polygon(hull).area - areas[i] - areas[j]
+            heapq.heappush(queue, (gain, i, j))
+
+    offer((i, j) for i in parts for j in neighbours[i] if i < j)
+    while queue:
+        gain, i, j = heapq.heappop(queue)
+        if i not in parts or j not in parts:
+            continue
+        if gain > budget:
+            break
+        budget -= max(gain, 0.0)
+        new = len(pieces) + len(areas)
+        hull = convex_hull(np.concatenate([parts.pop(i), parts.pop(j)]))
+        parts[new] = hull
+        areas[new] = shapely.Polygon(hull).area
+        neighbours[new] = {k for k in neighbours[i] | neighbours[j] if k in parts}
+        for k in neighbours[new]:
+            neighbours[k].add(new)
+        offer((k, new) for k in sorted(neighbours[new]))
+    least = _SLIVER * sum(areas[i] for i in parts)
+    return [convex_outline("part", parts[i]) for i in parts if areas[i] > least]
+
+
+def _neighbours(pieces: list[FloatArray]) -> dict[int, set[int]]:
+    """The pieces that share an edge with each piece."""
+    owners: dict[frozenset[bytes], list[int]] = {}
+    for i, piece in enumerate(pieces):
+        corners = [corner.tobytes() for corner in piece + 0.0]
+        for a, b in zip(corners, corners[1:] + corners[:1], strict=True):
+            owners.setdefault(frozenset((a, b)), []).append(i)
+    found: dict[int, set[int]] = {i: set() for i in range(len(pieces))}
+    for sharing in owners.values():
+        for i in sharing:
+            found[i].update(j for j in sharing if j != i)
+    return found
