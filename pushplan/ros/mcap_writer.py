@@ -70,7 +70,7 @@ class McapWriter:
         self._counts = Counter[str]()
         self._scene: World | None = None
         self._known: set[int] = set()
-        self._shown: dict[int, FloatArray] = {}
+        self._shown: dict[int, Sequence[FloatArray]] = {}
 
     def scene(self, world: World) -> None:
         """Write robot, map, goal and objects, unless they are those of the last scene."""

@@ -22,7 +22,13 @@ from pushplan.world.checks import (
     frozen,
     number,
 )
-from pushplan.world.convex_shapes import ConvexParts, areas_and_centres, disjoint, rings_of, shapes_of
+from pushplan.world.convex_shapes import (
+    ConvexParts,
+    areas_and_centres,
+    disjoint,
+    rings_of,
+    shapes_of,
+)
 from pushplan.world.outline import (
     LARGEST_M,
     areas_and_centroids,

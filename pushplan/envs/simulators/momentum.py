@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pushplan.core import envs as core
-from pushplan.geometry import gyration_squares
 from pushplan.envs.simulators.base import Materials
+from pushplan.geometry import gyration_squares
 from pushplan.world import World
 from pushplan.world.checks import FloatArray, IntArray
 
