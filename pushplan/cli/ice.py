@@ -63,8 +63,13 @@ def _draw(field: IceField, path: str) -> None:
     from pushplan.drawing import save_image
     from pushplan.drawing.canvas import Canvas
     from pushplan.drawing.palette import WATER_PALETTE
+    from pushplan.world.convex_shapes import rings_of
 
     canvas = Canvas(field.bounds, PICTURE_PX, WATER_PALETTE.floor)
-    for corners in field.polygons:
-        canvas.polygon(corners, *WATER_PALETTE.box, WATER_PALETTE.box_edge_px / canvas.unit)
+    fill, edge = WATER_PALETTE.box
+    for parts in field.floes:
+        for part in parts:
+            canvas.polygon(part, fill, fill)
+        for ring in rings_of(parts):
+            canvas.polygon(ring, None, edge, WATER_PALETTE.box_edge_px / canvas.unit)
     save_image(path, np.asarray(canvas.finish()))

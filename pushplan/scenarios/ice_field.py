@@ -8,38 +8,39 @@ from functools import cached_property
 import numpy as np
 
 from pushplan.world.checks import ArrayRecord, FloatArray, checked_bounds, frozen
-from pushplan.world.outline import areas_and_centroids, convex_outlines, flatten
+from pushplan.world.convex_shapes import ConvexParts, areas_and_centres, disjoint, shapes_of
 
 
 @dataclass(frozen=True, eq=False)
 class IceField(ArrayRecord):
-    """Convex floes on a rectangle of water.
+    """Floes on a rectangle of water.
 
     Args:
-        polygons: K convex outlines, each (N, 2) corners [m], world frame.
+        floes: K shapes in the world frame: corners (N, 2) [m], or what else
+            `pushplan.world.Movables.from_outlines` takes; kept as their convex parts.
         bounds: (4,) x_min, y_min, x_max, y_max of the ice-covered water [m].
 
     Raises:
-        InvalidInputError: if an outline is not convex or has no area, or the bounds are empty.
+        InvalidInputError: if a floe has no area or crosses itself, or the bounds are empty.
             Whether floes overlap is not looked at here: `load_ice` does, and `generate_ice` makes
             none.
     """
 
-    polygons: tuple[FloatArray, ...]
+    floes: tuple[ConvexParts, ...]
     bounds: FloatArray
 
     def __post_init__(self) -> None:
         put = object.__setattr__
         put(self, "bounds", checked_bounds("ice bounds", self.bounds))
-        put(self, "polygons", tuple(convex_outlines("floe", self.polygons)))
+        put(self, "floes", tuple(shapes_of("floe", self.floes)))
 
     def __len__(self) -> int:
-        return len(self.polygons)
+        return len(self.floes)
 
     @cached_property
     def areas(self) -> FloatArray:
         """(K,) areas of the floes [m²]."""
-        return frozen(areas_and_centroids(*flatten(self.polygons))[0])
+        return frozen(areas_and_centres([disjoint(parts) for parts in self.floes])[0])
 
     @property
     def radii(self) -> FloatArray:

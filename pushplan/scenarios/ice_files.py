@@ -3,38 +3,34 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike
 
 from pushplan.errors import short
 from pushplan.files.safe_files import known_keys, read_data, read_npy, read_npz
+from pushplan.geometry import convex_penetration
 from pushplan.scenarios.ice_field import IceField
 from pushplan.world import InvalidInputError, SchemaError
-from pushplan.world.checks import (
-    FloatArray,
-    array,
-    checked_bounds,
-    expect,
-)
-from pushplan.world.outline import (
-    NotConvexError,
-    convex_hull,
-    convex_outline,
-    convex_outlines,
-    flatten,
-    unflatten,
-)
+from pushplan.world.checks import FloatArray, IntArray, array, checked_bounds, expect
+from pushplan.world.convex_shapes import ConvexParts, shapes_of
+from pushplan.world.outline import convex_hull, flatten, outline_boxes
+from pushplan.world.outline_repair import OutlineWarning
 
 SCHEMA = "pushplan-ice/1"
 """Name and version of the JSON form; files of another version are refused."""
 _MAX_BYTES = 10**8
 ENDINGS = (".json", ".npz", ".npy")
-_OVERLAP = 1e-6  # floes may overlap by this fraction of the smaller one: rounding, where they touch
+_OVERLAP = 1e-6
+"""Depth [radii of the smaller floe] to which floes may overlap: rounding, where they touch."""
+_ROUNDS = 500  # in which floes that overlap are moved apart, at most
+_GAP = 1e-3  # that is left between them [radii of the smaller floe]
 
 
 def load_ice(path: str | Path, *, hull: bool = False, overlaps: bool = False) -> IceField:
@@ -48,19 +44,22 @@ def load_ice(path: str | Path, *, hull: bool = False, overlaps: bool = False) ->
       them and the last ends, and ``bounds`` if you like.
     - ``.npy``: an array (K, N, 2) of K floes with N corners each.
 
-    Outlines are checked as `pushplan.world.outline.convex_outline` does. Without bounds, the
-    rectangle around all floes counts.
+    Floes need not be convex; a list of outlines in place of one is a floe of several parts. They
+    are repaired and cut into convex parts as `pushplan.world.outline_repair.outline_parts` says.
+    Those that overlap are moved apart: again and again each pair by the least translation that
+    separates it, the lighter floe more, and back into the bounds. An `OutlineWarning` says how far.
+    Without bounds, the rectangle around all floes counts.
 
     Args:
         path: the file.
-        hull: take the convex hull of a floe that is not convex, instead of refusing it.
-        overlaps: take floes that overlap, as those of the 2D benchmark do and hulls of floes that
-            a camera sees, instead of refusing them.
+        hull: take the convex hull of a floe that is not convex.
+        overlaps: leave floes that overlap where they are, as those of the 2D benchmark are.
 
     Raises:
         SchemaError: if the file cannot be read or has another form.
-        InvalidInputError: if a floe is not convex, has no area or leaves the bounds, or if two
-            floes overlap. Messages name the file, the polygon, counted from 0, and the rule.
+        InvalidInputError: if a floe crosses itself, has no area or leaves the bounds, or if there
+            is no room to move floes apart. Messages name the file, the polygon, counted from 0,
+            and the rule.
     """
     path = _path(path)
     if path.suffix.lower() not in ENDINGS:
@@ -75,14 +74,12 @@ def load_ice(path: str | Path, *, hull: bool = False, overlaps: bool = False) ->
     except InvalidInputError as error:
         raise SchemaError(f"{path}: {error}") from error
     try:
-        floes = _clean(polygons, hull)
+        floes = _floes(polygons, hull)
         field = IceField(floes, _bounds(floes, bounds))
         _check_inside(field)
-        if not overlaps:
-            _check_apart(field)
+        return field if overlaps else _apart(field)
     except InvalidInputError as error:
         raise InvalidInputError(f"{path}: {error}") from error
-    return field
 
 
 def save_ice(field: IceField, path: str | Path) -> None:
@@ -98,19 +95,26 @@ def save_ice(field: IceField, path: str | Path) -> None:
             data = {
                 "schema": SCHEMA,
                 "bounds": field.bounds.tolist(),
-                "polygons": [corners.tolist() for corners in field.polygons],
+                "polygons": [_listed(parts) for parts in field.floes],
             }
             path.write_text(json.dumps(data) + "\n", encoding="utf-8")
         elif ending == ".npz":
-            vertices, offsets = flatten(field.polygons)
+            vertices, offsets = flatten([part for parts in field.floes for part in parts])
+            arrays = {"vertices": vertices, "offsets": offsets, "bounds": field.bounds}
+            if len(offsets) != len(field) + 1:
+                arrays["first_parts"] = np.cumsum([0, *map(len, field.floes)])
             with path.open("wb") as file:
-                np.savez_compressed(file, vertices=vertices, offsets=offsets, bounds=field.bounds)
+                np.savez_compressed(file, **arrays)
         else:
             raise InvalidInputError(
                 f"an ice field is written to a .json or .npz file, got {str(path)!r}"
             )
     except OSError as error:
         raise InvalidInputError(f"cannot write {path}: {error}") from error
+
+
+def _listed(parts: ConvexParts) -> list[Any]:
+    return parts[0].tolist() if len(parts) == 1 else [part.tolist() for part in parts]
 
 
 def _path(path: object) -> Path:
@@ -150,20 +154,25 @@ def _placed(floes: object) -> list[FloatArray]:
 
 
 def _read_npz(path: Path) -> tuple[Sequence[Any], object]:
-    arrays = read_npz(path, "ice field", ("vertices", "offsets"), ("bounds",), _MAX_BYTES)
+    optional = ("bounds", "first_parts")
+    arrays = read_npz(path, "ice field", ("vertices", "offsets"), optional, _MAX_BYTES)
     vertices = array("vertices", arrays["vertices"], (None, 2))
-    offsets = array("offsets", arrays["offsets"], (None,), dtype=np.int64)
-    if (
-        len(offsets) == 0
-        or offsets[0] != 0
-        or offsets[-1] != len(vertices)
-        or (np.diff(offsets) < 0).any()
-    ):
+    parts = _groups(path, "offsets", arrays["offsets"], vertices, "vertices")
+    if "first_parts" not in arrays:
+        return parts, arrays.get("bounds")
+    return _groups(path, "first_parts", arrays["first_parts"], parts, "parts"), arrays.get("bounds")
+
+
+def _groups(path: Path, name: str, starts: object, items: Any, what: str) -> list[Any]:
+    """Consecutive items, grouped by where each group starts."""
+    offsets: IntArray = array(name, starts, (None,), dtype=np.int64)
+    rises = len(offsets) > 0 and offsets[0] == 0 and (np.diff(offsets) >= 0).all()
+    if not rises or offsets[-1] != len(items):
         raise SchemaError(
-            f"{path}: offsets must rise from 0 to the number of vertices, {len(vertices)}, "
+            f"{path}: {name} must rise from 0 to the number of {what}, {len(items)}, "
             f"got {offsets.tolist()!s:.60}"
         )
-    return unflatten(vertices, offsets), arrays.get("bounds")
+    return [items[a:b] for a, b in pairwise(offsets.tolist())]
 
 
 def _read_npy(path: Path) -> tuple[Sequence[Any], object]:
@@ -175,54 +184,93 @@ def _read_npy(path: Path) -> tuple[Sequence[Any], object]:
 _READERS = {".json": _read_json, ".npz": _read_npz, ".npy": _read_npy}
 
 
-def _clean(polygons: Sequence[Any], hull: bool) -> tuple[FloatArray, ...]:
-    """Convex outlines; of others the hulls where that is asked for."""
-    if hull:
-        return tuple(_or_hull(f"polygon {i}", corners) for i, corners in enumerate(polygons))
-    try:
-        return tuple(convex_outlines("polygon", polygons))
-    except NotConvexError as error:
-        way_on = "hull=True (--hull, the variation ice_hull) takes its convex hull"
-        raise InvalidInputError(f"{error}; {way_on}") from error
+def _floes(polygons: Sequence[Any], hull: bool) -> list[ConvexParts]:
+    floes = shapes_of("polygon", polygons)
+    if not hull:
+        return floes
+    return [parts if len(parts) == 1 else (convex_hull(np.concatenate(parts)),) for parts in floes]
 
 
-def _or_hull(name: str, corners: ArrayLike) -> FloatArray:
-    try:
-        return convex_outline(name, corners)
-    except InvalidInputError:
-        return convex_outline(name, convex_hull(array(name, corners, (None, 2))))
-
-
-def _bounds(floes: Sequence[FloatArray], bounds: object) -> FloatArray:
+def _bounds(floes: Sequence[ConvexParts], bounds: object) -> FloatArray:
     if bounds is not None:
         return checked_bounds("ice bounds", bounds)
     if not floes:
         raise InvalidInputError("an ice field without floes must state its bounds")
-    corners = np.concatenate(floes)
-    return checked_bounds("ice bounds", [*corners.min(axis=0), *corners.max(axis=0)])
+    boxes = _boxes(floes)
+    return checked_bounds("ice bounds", [*boxes[:, :2].min(axis=0), *boxes[:, 2:].max(axis=0)])
+
+
+def _boxes(floes: Sequence[ConvexParts]) -> FloatArray:
+    """(K, 4) x_min, y_min, x_max, y_max [m] of the floes."""
+    return outline_boxes(*flatten([np.concatenate(parts) for parts in floes]))
 
 
 def _check_inside(field: IceField) -> None:
     slack = 1e-9 * float((field.bounds[2:] - field.bounds[:2]).max())
-    for i, corners in enumerate(field.polygons):
-        if (corners < field.bounds[:2] - slack).any() or (corners > field.bounds[2:] + slack).any():
-            raise InvalidInputError(
-                f"polygon {i} must lie within the bounds {field.bounds.tolist()}, "
-                f"got {corners.tolist()!s:.80}"
-            )
-
-
-def _check_apart(field: IceField) -> None:
-    """Refuse floes that overlap; touching is fine."""
-    shapes = np.array([shapely.Polygon(corners) for corners in field.polygons], dtype=object)
-    first, second = shapely.STRtree(shapes).query(shapes, predicate="intersects")
-    first, second = first[first < second], second[first < second]
-    shared = shapely.area(shapely.intersection(shapes[first], shapes[second]))
-    bad = shared > _OVERLAP * np.minimum(field.areas[first], field.areas[second])
-    if bad.any():
-        worst = int(np.argmax(np.where(bad, shared, 0.0)))
+    boxes = _boxes(field.floes)
+    within = (boxes[:, :2] >= field.bounds[:2] - slack) & (boxes[:, 2:] <= field.bounds[2:] + slack)
+    for i in np.flatnonzero(~within.all(axis=1)).tolist():
         raise InvalidInputError(
-            f"floes must not overlap: polygons {first[worst]} and {second[worst]} share "
-            f"{shared[worst]:.3g} m², the most of {int(bad.sum())} pairs; overlaps=True "
-            "(--overlaps, the variation ice_overlaps) takes them so"
+            f"polygon {i} must lie within the bounds {field.bounds.tolist()}, "
+            f"it reaches from {boxes[i, :2].tolist()} to {boxes[i, 2:].tolist()}"
         )
+
+
+def _apart(field: IceField) -> IceField:
+    """The field with floes that overlap moved apart; touching is fine."""
+    boxes = _boxes(field.floes)
+    shifts = np.zeros((len(field), 2))
+    pairs = _overlaps(field, boxes, shifts)
+    first_count = len(pairs)
+    for _ in range(_ROUNDS):
+        if not pairs:
+            break
+        for a, b, depth, normal in pairs:
+            share = field.areas[b] / (field.areas[a] + field.areas[b])
+            way = (depth + _GAP * min(field.radii[a], field.radii[b])) * normal
+            shifts[a] -= share * way
+            shifts[b] += (1.0 - share) * way
+        shifts = np.clip(shifts, field.bounds[:2] - boxes[:, :2], field.bounds[2:] - boxes[:, 2:])
+        pairs = _overlaps(field, boxes, shifts)
+    if pairs:
+        a, b, depth, _ = max(pairs, key=itemgetter(2))
+        raise InvalidInputError(
+            f"floes must not overlap, and there is no room to move them apart: of {len(pairs)} "
+            f"pairs, polygons {a} and {b} still overlap by {depth:.3g} m; overlaps=True "
+            "(--overlaps, the variation ice_overlaps) leaves them as they are"
+        )
+    moved = shifts.any(axis=1)
+    if not moved.any():
+        return field
+    ways = np.hypot(*shifts.T)
+    warnings.warn(
+        f"{first_count} pairs of floes overlapped: {int(moved.sum())} of {len(field)} floes were "
+        f"moved apart by at most {ways.max():.3g} m",
+        OutlineWarning,
+        stacklevel=3,
+    )
+    floes = [
+        tuple(part + shift for part in parts) if moved[k] else parts
+        for k, (parts, shift) in enumerate(zip(field.floes, shifts, strict=True))
+    ]
+    return IceField(tuple(floes), field.bounds)
+
+
+def _overlaps(
+    field: IceField, boxes: FloatArray, shifts: FloatArray
+) -> list[tuple[int, int, float, FloatArray]]:
+    """Pairs of shifted floes that overlap: both, how deep [m], and the way out for the second."""
+    low, high = boxes[:, :2] + shifts, boxes[:, 2:] + shifts
+    tree = shapely.STRtree(shapely.box(*low.T, *high.T))
+    pairs = tree.query(tree.geometries, predicate="intersects").T
+    found = []
+    for a, b in pairs[pairs[:, 0] < pairs[:, 1]].tolist():
+        shift = shifts[b] - shifts[a]
+        depth, *normal = max(
+            convex_penetration(one, other + shift)
+            for one in field.floes[a]
+            for other in field.floes[b]
+        )
+        if depth > _OVERLAP * min(field.radii[a], field.radii[b]):
+            found.append((a, b, depth, np.array(normal)))
+    return found

@@ -9,7 +9,7 @@ import numpy as np
 
 from pushplan.errors import InvalidInputError
 from pushplan.world.checks import FloatArray
-from pushplan.world.outline import areas_and_centroids, convex_outlines, flatten
+from pushplan.world.outline import areas_and_centroids, convex_outlines, flatten, listed
 
 ConvexParts = tuple[FloatArray, ...]
 """Convex outlines, counter-clockwise, each (N, 2) [m]; the shape is their union."""
@@ -30,8 +30,12 @@ def shapes_of(
     Raises:
         InvalidInputError: as `pushplan.world.outline_repair.outline_parts`.
     """
-    try:
-        return [(outline,) for outline in convex_outlines(name, shapes)]  # nearly always
+    try:  # nearly always
+        single = [
+            shape[0] if isinstance(shape, tuple) and len(shape) == 1 else shape
+            for shape in listed(name, shapes)
+        ]
+        return [(outline,) for outline in convex_outlines(name, single)]
     except InvalidInputError:
         from pushplan.world.outline_repair import cut_outlines
 

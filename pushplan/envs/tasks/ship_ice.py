@@ -129,7 +129,8 @@ class ShipIceTask(Task):
             raise ScenarioError(f"ship_ice: {error}") from error
         low = self.static.bounds[:2]
         high = self.static.bounds[2:]
-        for i, corners in enumerate(field.polygons):
+        for i, parts in enumerate(field.floes):
+            corners = np.concatenate(parts)
             if (corners < low - 1e-9).any() or (corners > high + 1e-9).any():
                 raise ScenarioError(
                     f"ship_ice: {path}: polygon {i} must lie in the channel, x in [0, {high[0]:g}] "
@@ -151,7 +152,7 @@ class ShipIceTask(Task):
             robot_pose=pose,
             static=self.static,
             movables=Movables.from_polygons(
-                field.polygons,
+                field.floes,
                 density=self.preset.floe_density,
                 contact_radii=self.preset.contact_radius,
             ),
@@ -179,7 +180,8 @@ class ShipIceTask(Task):
 
     def _free_pose(self, rng: np.random.Generator, field: IceField) -> FloatArray:
         """A start that is free of given ice."""
-        tree = shapely.STRtree([shapely.Polygon(corners) for corners in field.polygons])
+        parts = [part for floe in field.floes for part in floe]
+        tree = shapely.STRtree([shapely.Polygon(part) for part in parts])
         for _ in range(_START_TRIES if self.variations.start_x is None else 1):
             pose = self._start_pose(rng)
             if len(tree.query(self._berth(pose), predicate="intersects")) == 0:
