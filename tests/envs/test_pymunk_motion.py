@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from pushplan.core import envs as core
 from pushplan.envs.simulators.base import Materials
-from pushplan.envs.simulators.pymunk_drive import PymunkOptions
+from pushplan.envs.simulators.pymunk_options import PymunkOptions
 from pushplan.envs.simulators.pymunk_simulator import PymunkSimulator
 from pushplan.envs.simulators.water import Water
 from pushplan.geometry import convex_distance
