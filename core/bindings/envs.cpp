@@ -16,14 +16,6 @@ using namespace nb::literals;
 namespace {
 
 using Address = std::uintptr_t;
-/// Of the functions of `ContactCallbacks`.
-using CallbackAddresses = std::tuple<Address, Address, Address>;
-constexpr std::size_t kFunctions = kChipmunkNames.size();
-
-CallbackAddresses addresses(const ContactCallbacks& callbacks) {
-  return {std::bit_cast<Address>(callbacks.begin), std::bit_cast<Address>(callbacks.touch),
-          std::bit_cast<Address>(callbacks.end)};
-}
 
 template <class T>
 std::vector<T*> pointers(const std::vector<Address>& addresses) {
@@ -87,19 +79,23 @@ void bind_envs(nb::module_& module) {
           nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>(), nb::keep_alive<1, 5>(),
           nb::keep_alive<1, 6>());
 
-  module.attr("CHIPMUNK") = nb::cast(kChipmunkNames);
-  module.attr("CONTACT_POINTS_BYTES") = sizeof(ContactPoints);
-  module.def("object_callbacks", [] { return addresses(object_callbacks()); });
+  module.def("chipmunk_functions", [] { return kChipmunkNames; });
+  module.def("contact_points_size", [] { return sizeof(ContactPoints); });
   module.def(
-      "robot_callbacks", [](bool is_fixed) { return addresses(robot_callbacks(is_fixed)); },
-      "is_fixed"_a);
+      "contact_callbacks",
+      [](bool of_robot, bool with_fixed) {
+        const ContactCallbacks found = contact_callbacks(of_robot, with_fixed);
+        return std::tuple(std::bit_cast<Address>(found.begin), std::bit_cast<Address>(found.touch),
+                          std::bit_cast<Address>(found.end));
+      },
+      "of_robot"_a, "with_fixed"_a);
 
   nb::class_<PlanarSimulator>(module, "PlanarSimulator",
                               "A robot among objects in a space of Chipmunk.")
       .def(
           "__init__",
-          [](PlanarSimulator* self, const std::array<Address, kFunctions>& functions, Address space,
-             const std::vector<Address>& bodies, const std::vector<Address>& shapes,
+          [](PlanarSimulator* self, const std::array<Address, kChipmunkNames.size()>& functions,
+             Address space, const std::vector<Address>& bodies, const std::vector<Address>& shapes,
              const nb::object&, const Reach& reach, const Obstacles& obstacles,
              const Floats<1>& keeps, const Floats<2>& inertia, const Floats<2>& drag,
              const FloatsOut<2>& states, double travel, double tolerance, double rest, double decay,
@@ -138,10 +134,8 @@ void bind_envs(nb::module_& module) {
       .def_prop_ro("touched", &PlanarSimulator::touched)
       .def_prop_ro("loaded", &PlanarSimulator::loaded,
                    "Number of objects that the last step needed the engine for.")
-      .def_prop_rw(
-          "loads_all", [](const PlanarSimulator& self) { return self.loads_all; },
-          [](PlanarSimulator& self, bool loads_all) { self.loads_all = loads_all; },
-          "True if objects that cannot move are simulated as well.")
+      .def_rw("loads_all", &PlanarSimulator::loads_all,
+              "True if objects that cannot move are simulated as well.")
       .def_prop_ro("contacts", [](PlanarSimulator& self) {
         return reinterpret_cast<Address>(&self.contacts());
       });

@@ -48,10 +48,9 @@ void measure(cpArbiter* arbiter, void* data) {
 
 }  // namespace
 
-ContactCallbacks object_callbacks() { return {begin_object, nullptr, end_object}; }
-
-ContactCallbacks robot_callbacks(bool is_fixed) {
-  return {is_fixed ? begin_robot_fixed : begin_robot_static, measure_robot, end_robot};
+ContactCallbacks contact_callbacks(bool of_robot, bool with_fixed) {
+  if (!of_robot) return {begin_object, nullptr, end_object};
+  return {with_fixed ? begin_robot_fixed : begin_robot_static, measure_robot, end_robot};
 }
 
 ChipmunkScene::ChipmunkScene(const Chipmunk& engine, const ChipmunkHandles& handles,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -32,7 +33,7 @@ class PymunkBodies:
         iterations: sweeps of the contact solver.
 
     Attributes:
-        functions: of the engine, in the order of ``core.CHIPMUNK``.
+        functions: of the engine, in the order of ``core.chipmunk_functions``.
         handles: of the space, of the bodies (the robot first), and of the shapes of the robot and
             then of each object.
 
@@ -70,9 +71,9 @@ class PymunkBodies:
             return int(ffi.cast("uintptr_t", of))
 
         points = ffi.sizeof("cpContactPointSet")
-        if ffi.sizeof("cpFloat") != 8 or points != core.CONTACT_POINTS_BYTES:
+        if ffi.sizeof("cpFloat") != 8 or points != core.contact_points_size():
             raise TypeError(f"its numbers and points of contact have other sizes, {points} bytes")
-        self.functions = [address(ffi.addressof(lib, name)) for name in core.CHIPMUNK]
+        self.functions = [address(ffi.addressof(lib, name)) for name in core.chipmunk_functions()]
         bodies = [self.robot, *(body for body, _ in self._objects)]
         shapes = [*self._robot_shapes, *(shape for _, shape in self._objects)]
         self.handles = (
@@ -86,14 +87,9 @@ class PymunkBodies:
     def watch(self, record: int) -> None:
         """Let the engine report contacts of moving and static shapes to a record of the core."""
         ffi = self._ffi
-        for kind, still, callbacks in (
-            (OBJECT, STATIC, core.object_callbacks()),
-            (OBJECT, FIXED, core.object_callbacks()),
-            (ROBOT, STATIC, core.robot_callbacks(False)),
-            (ROBOT, FIXED, core.robot_callbacks(True)),
-        ):
+        for kind, still in itertools.product((ROBOT, OBJECT), (STATIC, FIXED)):
             handler = self._lib.cpSpaceAddCollisionHandler(self.space._space, kind, still)
-            begin, touch, end = callbacks
+            begin, touch, end = core.contact_callbacks(kind == ROBOT, still == FIXED)
             handler.beginFunc = ffi.cast("cpCollisionBeginFunc", begin)
             if touch:
                 handler.preSolveFunc = ffi.cast("cpCollisionPreSolveFunc", touch)

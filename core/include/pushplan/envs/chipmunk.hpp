@@ -88,8 +88,8 @@ struct ContactCallbacks {
   Callback touch;  // nullptr if nothing is to be done
   Callback end;
 };
-ContactCallbacks object_callbacks();
-ContactCallbacks robot_callbacks(bool is_fixed);  // of the robot and a fixed object
+/// For pairs of the robot, or else an object, and a fixed object, or else what is static.
+ContactCallbacks contact_callbacks(bool of_robot, bool with_fixed);
 
 /// Pose and velocity of a body, world frame.
 struct BodyState {
