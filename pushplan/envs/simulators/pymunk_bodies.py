@@ -51,38 +51,41 @@ class PymunkBodies:
         self.space.collision_slop = slop
         self.space.iterations = iterations
         robot_mu, object_mu, static_mu = _shape_frictions(materials)
-        self.robot = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+        self._robot = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
         self._robot_shapes = self._make_robot(world, robot_mu)
-        self._objects = self._make_objects(world, object_mu)
         self._add_static(world, static_mu)
         try:
-            self._find_engine()
+            from pymunk._chipmunk import ffi, lib
+
+            self._ffi = ffi
+            self._lib = lib
+            self._objects = self._make_objects(world, object_mu)
+            self._find_addresses()
         except (ImportError, AttributeError, TypeError) as error:
             raise MissingDependencyError(
                 f"pymunk {pymunk.version} does not give access to its engine as 7.3 does "
                 f"({error}): pip install 'pymunk>=7.3,<8'"
             ) from error
 
-    def _find_engine(self) -> None:
-        """Look up the addresses in the private parts of Pymunk."""
-        from pymunk._chipmunk import ffi, lib
+    def _find_addresses(self) -> None:
+        ffi = self._ffi
+        points = ffi.sizeof("cpContactPointSet")
+        if ffi.sizeof("cpFloat") != 8 or points != core.contact_points_size():
+            raise TypeError(f"its numbers and points of contact have other sizes, {points} bytes")
 
         def address(of: Any) -> int:
             return int(ffi.cast("uintptr_t", of))
 
-        points = ffi.sizeof("cpContactPointSet")
-        if ffi.sizeof("cpFloat") != 8 or points != core.contact_points_size():
-            raise TypeError(f"its numbers and points of contact have other sizes, {points} bytes")
-        self.functions = [address(ffi.addressof(lib, name)) for name in core.chipmunk_functions()]
-        bodies = [self.robot, *(body for body, _ in self._objects)]
-        shapes = [*self._robot_shapes, *(shape for _, shape in self._objects)]
+        names = core.chipmunk_functions()
+        self.functions = [address(ffi.addressof(self._lib, name)) for name in names]
+        bodies = [self._robot._body, *(body for body, _ in self._objects)]
+        shapes = [part._shape for part in self._robot_shapes]
+        shapes += [shape for _, shape in self._objects]
         self.handles = (
             address(self.space._space),
-            [address(body._body) for body in bodies],
-            [address(shape._shape) for shape in shapes],
+            [address(body) for body in bodies],
+            [address(shape) for shape in shapes],
         )
-        self._ffi = ffi
-        self._lib = lib
 
     def watch(self, record: int) -> None:
         """Let the engine report contacts of moving and static shapes to a record of the core."""
@@ -114,7 +117,7 @@ class PymunkBodies:
         shapes: list[pymunk.Shape] = []
         robot = world.robot
         for part in robot.parts:
-            shape = pymunk.Poly(self.robot, part.tolist(), radius=robot.contact_radius)
+            shape = pymunk.Poly(self._robot, part.tolist(), radius=robot.contact_radius)
             shape.friction = friction
             shape.collision_type = ROBOT
             shapes.append(shape)
@@ -122,23 +125,29 @@ class PymunkBodies:
             wheel.filter = pymunk.ShapeFilter(mask=pymunk.ShapeFilter.ALL_MASKS() ^ _GROUND)
         return shapes
 
-    def _make_objects(
-        self, world: World, friction: float
-    ) -> list[tuple[pymunk.Body, pymunk.Shape]]:
+    def _make_objects(self, world: World, friction: float) -> list[tuple[Any, Any]]:
+        """Make (body, shape) of each object, which takes Pymunk's classes four times as long.
+
+        There may be hundreds of floes of which the engine needs a few dozen.
+        """
+        ffi = self._ffi
+        lib = self._lib
         movables = world.movables
-        made: list[tuple[pymunk.Body, pymunk.Shape]] = []
-        for k in range(len(movables)):
-            outline = movables.drawn_outline(k).tolist()
-            radius = float(movables.contact_radii[k])
-            mass = float(movables.masses[k])
-            if movables.fixed[k]:
-                body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+        made: list[tuple[Any, Any]] = []
+        here = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0)  # the transform that changes nothing
+        radii = movables.contact_radii.tolist()
+        for k, mass in enumerate(movables.masses.tolist()):
+            fixed = bool(movables.fixed[k])
+            outline = movables.drawn_outline(k)
+            corners = len(outline), ffi.from_buffer("cpVect[]", outline)
+            if fixed:
+                body = lib.cpBodyNewKinematic()
             else:
-                body = pymunk.Body(mass, pymunk.moment_for_poly(mass, outline))
-            shape = pymunk.Poly(body, outline, radius=radius)
-            shape.friction = friction
-            shape.collision_type = FIXED if movables.fixed[k] else OBJECT
-            made.append((body, shape))
+                body = lib.cpBodyNew(mass, lib.cpMomentForPoly(mass, *corners, (0.0, 0.0), 0.0))
+            shape = lib.cpPolyShapeNew(body, *corners, here, radii[k])
+            lib.cpShapeSetFriction(shape, friction)
+            lib.cpShapeSetCollisionType(shape, FIXED if fixed else OBJECT)
+            made.append((ffi.gc(body, lib.cpBodyFree), ffi.gc(shape, lib.cpShapeFree)))
         return made
 
 

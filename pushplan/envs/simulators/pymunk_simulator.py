@@ -143,6 +143,11 @@ class PymunkSimulator(Simulator):
         self._time += duration
         return self._core.sweep(b, np.array([dx, dy, turn]), math.hypot(dx, dy), duration)
 
+    @property
+    def robot_pose(self) -> FloatArray:
+        """(3,) x, y [m], theta [rad] of the robot now; cheap."""
+        return self._rows[0, :3].copy()
+
     def _motion(self) -> tuple[float, FloatArray, FloatArray]:
         rows = self._rows.copy()
         return self._time, rows[:, :3], rows[:, 3:]
