@@ -2,8 +2,8 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
 #include <bit>
-#include <cstring>
 
 #include "arrays.hpp"
 #include "pushplan/envs/planar_simulator.hpp"
@@ -16,6 +16,7 @@ using namespace nb::literals;
 namespace {
 
 using Address = std::uintptr_t;
+using Functions = std::array<Address, sizeof(Chipmunk) / sizeof(Address)>;
 
 template <class T>
 std::vector<T*> pointers(const std::vector<Address>& addresses) {
@@ -26,13 +27,12 @@ std::vector<T*> pointers(const std::vector<Address>& addresses) {
 
 /// What a simulator recorded in its last step: (T, 3) poses of the robot, (T, K, 3) of the objects.
 auto recorded(const PlanarSimulator& simulator) {
-  const auto robot = simulator.robot_path();
-  const auto objects = simulator.object_paths();
+  const auto& [robot, objects, held, touched] = simulator.record();
   const auto poses = zeros<double, 2>({robot.size(), 3});
   const auto paths = zeros<double, 3>({robot.size(), simulator.count(), 3});
-  std::memcpy(poses.data(), robot.data(), robot.size_bytes());
-  if (!objects.empty()) std::memcpy(paths.data(), objects.data(), objects.size_bytes());
-  return std::tuple(poses, paths);
+  std::ranges::copy(robot, reinterpret_cast<Pose*>(poses.data()));
+  std::ranges::copy(objects, reinterpret_cast<Pose*>(paths.data()));
+  return std::tuple(poses, paths, held, touched);
 }
 
 }  // namespace
@@ -79,14 +79,11 @@ void bind_envs(nb::module_& module) {
           nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>(), nb::keep_alive<1, 5>(),
           nb::keep_alive<1, 6>());
 
-  module.def("chipmunk_functions", [] { return kChipmunkNames; });
   module.def("contact_points_size", [] { return sizeof(ContactPoints); });
   module.def(
       "contact_callbacks",
       [](bool of_robot, bool with_fixed) {
-        const ContactCallbacks found = contact_callbacks(of_robot, with_fixed);
-        return std::tuple(std::bit_cast<Address>(found.begin), std::bit_cast<Address>(found.touch),
-                          std::bit_cast<Address>(found.end));
+        return std::bit_cast<std::array<Address, 3>>(contact_callbacks(of_robot, with_fixed));
       },
       "of_robot"_a, "with_fixed"_a);
 
@@ -94,8 +91,8 @@ void bind_envs(nb::module_& module) {
                               "A robot among objects in a space of Chipmunk.")
       .def(
           "__init__",
-          [](PlanarSimulator* self, const std::array<Address, kChipmunkNames.size()>& functions,
-             Address space, const std::vector<Address>& bodies, const std::vector<Address>& shapes,
+          [](PlanarSimulator* self, const Functions& functions, Address space,
+             const std::vector<Address>& bodies, const std::vector<Address>& shapes,
              const nb::object&, const Reach& reach, const Obstacles& obstacles,
              const Floats<1>& keeps, const Floats<2>& inertia, const Floats<2>& drag,
              const FloatsOut<2>& states, double travel, double tolerance, double rest, double decay,
@@ -121,7 +118,8 @@ void bind_envs(nb::module_& module) {
             return recorded(self);
           },
           "linear"_a, "angular"_a, "duration"_a,
-          "(T, 3) poses of the robot and (T, K, 3) of the objects in a step.")
+          "Poses (T, 3) of the robot and (T, K, 3) of the objects in a step; whether the robot was\n"
+          "held, and touched something static.")
       .def(
           "sweep",
           [](PlanarSimulator& self, const OnePose& to, const OnePose& motion, double length,
@@ -130,8 +128,6 @@ void bind_envs(nb::module_& module) {
           "Drive straight to a pose; False if the robot was held.")
       .def("clear_for", &PlanarSimulator::clear_for, "linear"_a, "angular"_a, "limit"_a,
            "Time [s] for which the robot certainly touches nothing.")
-      .def_prop_ro("held", &PlanarSimulator::held)
-      .def_prop_ro("touched", &PlanarSimulator::touched)
       .def_prop_ro("loaded", &PlanarSimulator::loaded,
                    "Number of objects that the last step needed the engine for.")
       .def_rw("loads_all", &PlanarSimulator::loads_all,

@@ -34,15 +34,10 @@ void measure_robot(cpArbiter* arbiter, cpSpace*, void* data) {
   }
 }
 
-struct DeepestOverlap {
-  const Chipmunk* engine;
-  double depth;
-};
-
 void measure(cpArbiter* arbiter, void* data) {
-  auto& deepest = *static_cast<DeepestOverlap*>(data);
-  for (int i = 0; i < deepest.engine->contact_count(arbiter); ++i) {
-    deepest.depth = std::max(deepest.depth, -deepest.engine->contact_depth(arbiter, i));
+  StaticContacts& contacts = record(data);
+  for (int i = 0; i < contacts.engine->contact_count(arbiter); ++i) {
+    contacts.depth = std::max(contacts.depth, -contacts.engine->contact_depth(arbiter, i));
   }
 }
 
@@ -129,7 +124,7 @@ void ChipmunkScene::advance(const Twist& robot, double h) {
 }
 
 double ChipmunkScene::depth() const {
-  DeepestOverlap deepest{&engine_, contacts_.depth};
+  StaticContacts deepest = contacts_;
   engine_.each_contact(handles_.space, measure, &deepest);
   return deepest.depth;
 }

@@ -34,10 +34,7 @@ PlanarSimulator::PlanarSimulator(const Chipmunk& engine, const ChipmunkHandles& 
       missed_(std::make_unique<bool[]>(poses_.size())) {}
 
 void PlanarSimulator::step(double linear, double angular, double duration) {
-  held_ = false;
-  touched_ = false;
-  robot_path_.clear();
-  object_paths_.clear();
+  start_record();
   const ArcMotion motion{states_[0].pose.theta, linear, angular, settings_.holds};
   const double clear = clear_time(motion, duration);
   const double turn = std::abs(angular) * duration;
@@ -70,13 +67,10 @@ void PlanarSimulator::step(double linear, double angular, double duration) {
   choose(speed * rest, duration);
   const DriveStep drive{linear, angular, rest, motion.course, motion.holds, left, each};
   simulate(left, [&] { drive_.run(drive, active_, start_, driven_); });
-  held_ = drive_.held();
-  touched_ = scene_.contacts().touched;
 }
 
 bool PlanarSimulator::sweep(const Pose& to, const Pose& motion, double length, double duration) {
-  robot_path_.clear();
-  object_paths_.clear();
+  start_record();
   const double course = std::atan2(motion.y, motion.x);
   const ArcMotion straight{course, length / duration, motion.theta / duration, true};
   if (clear_time(straight, duration) >= duration) {
@@ -90,7 +84,7 @@ bool PlanarSimulator::sweep(const Pose& to, const Pose& motion, double length, d
   const double h = duration / static_cast<double>(count);
   choose(way, duration);
   simulate(1, [&] { drive_.sweep(velocity, h, count, active_, start_, driven_); });
-  return !drive_.held();
+  return !record_.held;
 }
 
 double PlanarSimulator::clear_for(double linear, double angular, double limit) {
@@ -102,6 +96,13 @@ double PlanarSimulator::clear_time(const ArcMotion& motion, double limit) {
   look_at_objects();
   if (rolls_) return 0.0;
   return reach_.clear_time(states_[0].pose, motion, limit, settings_.travel, poses_, obstacles_);
+}
+
+void PlanarSimulator::start_record() {
+  record_.robot.clear();
+  record_.objects.clear();
+  record_.held = false;
+  record_.touched = false;
 }
 
 void PlanarSimulator::look_at_objects() {
@@ -125,12 +126,12 @@ void PlanarSimulator::glide(const ArcMotion& motion, double duration, Index samp
   const Pose start = states_[0].pose;
   for (Index i = 0; i < samples; ++i) {
     const double time = duration * static_cast<double>(i + 1) / static_cast<double>(samples);
-    robot_path_.push_back(arc_pose(start, motion, time));
-    object_paths_.insert(object_paths_.end(), poses_.begin(), poses_.end());
+    record_.robot.push_back(arc_pose(start, motion, time));
+    record_.objects.insert(record_.objects.end(), poses_.begin(), poses_.end());
   }
   if (samples == 0) return;
   stop_objects();
-  const Pose end = robot_path_.back();
+  const Pose end = record_.robot.back();
   const double v = motion.linear;
   states_[0] = {end, {v * std::cos(end.theta), v * std::sin(end.theta), motion.angular}};
 }
@@ -149,9 +150,9 @@ void PlanarSimulator::simulate(Index samples, Run run) {
   const std::span<bool> loaded(loaded_.get(), poses_.size());
   const std::span<bool> missed(missed_.get(), poses_.size());
   const auto count = static_cast<Index>(poses_.size());
-  const auto begin = static_cast<Index>(object_paths_.size());
-  object_paths_.resize(object_paths_.size() + static_cast<std::size_t>(samples * count));
-  const ArrayView<Pose, 2> paths(object_paths_.data() + begin, {samples, count});
+  const auto begin = static_cast<Index>(record_.objects.size());
+  record_.objects.resize(record_.objects.size() + static_cast<std::size_t>(samples * count));
+  const ArrayView<Pose, 2> paths(record_.objects.data() + begin, {samples, count});
   ArrayView<BodyState, 2> driven;
   while (true) {
     active_.clear();
@@ -181,7 +182,9 @@ void PlanarSimulator::simulate(Index samples, Run run) {
     const auto body = static_cast<Index>(i + 1);
     states_[static_cast<std::size_t>(active_[i] + 1)] = driven(samples - 1, body);
   }
-  for (Index t = 0; t < samples; ++t) robot_path_.push_back(driven(t, 0).pose);
+  for (Index t = 0; t < samples; ++t) record_.robot.push_back(driven(t, 0).pose);
+  record_.held = drive_.held();
+  record_.touched = scene_.contacts().touched;
 }
 
 }  // namespace pushplan

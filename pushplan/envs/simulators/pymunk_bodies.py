@@ -19,6 +19,16 @@ STATIC = 3
 FIXED = 4
 _GROUND = 1 << 31  # category of what is static, which wheels do not meet
 
+_FUNCTIONS = (
+    *("cpSpaceStep", "cpSpaceSetCollisionBias", "cpSpaceEachCachedArbiter"),
+    *("cpSpaceAddBody", "cpSpaceRemoveBody", "cpSpaceAddShape", "cpSpaceRemoveShape"),
+    *("cpBodyGetPosition", "cpBodyGetAngle", "cpBodyGetVelocity", "cpBodyGetAngularVelocity"),
+    *("cpBodySetPosition", "cpBodySetAngle", "cpBodySetVelocity", "cpBodySetAngularVelocity"),
+    *("cpBodySetForce", "cpBodySetTorque", "cpBodyUpdatePosition"),
+    *("cpArbiterGetCount", "cpArbiterGetDepth", "cpArbiterGetContactPointSet"),
+)
+"""Functions of the engine in the order of `Chipmunk` in ``core/include/pushplan/envs``."""
+
 
 class PymunkBodies:
     """One kinematic robot, K objects, dynamic or fixed, and what is static.
@@ -33,7 +43,7 @@ class PymunkBodies:
         iterations: sweeps of the contact solver.
 
     Attributes:
-        functions: of the engine, in the order of ``core.chipmunk_functions``.
+        functions: of the engine, in the order of the core's `Chipmunk`.
         handles: of the space, of the bodies (the robot first), and of the shapes of the robot and
             then of each object.
 
@@ -76,8 +86,7 @@ class PymunkBodies:
         def address(of: Any) -> int:
             return int(ffi.cast("uintptr_t", of))
 
-        names = core.chipmunk_functions()
-        self.functions = [address(ffi.addressof(self._lib, name)) for name in names]
+        self.functions = [address(ffi.addressof(self._lib, name)) for name in _FUNCTIONS]
         bodies = [self._robot._body, *(body for body, _ in self._objects)]
         shapes = [part._shape for part in self._robot_shapes]
         shapes += [shape for _, shape in self._objects]

@@ -110,9 +110,9 @@ class PymunkSimulator(Simulator):
     def step(self, command: Twist, duration: float) -> Trace:
         """Drive at a body-frame velocity for ``duration`` [s]."""
         duration = number("duration", duration, low=0.0, open_low=True)
-        robot, paths = self._core.step(command.linear, command.angular, duration)
-        self._held = self._core.held
-        self._touched = self._core.touched
+        robot, paths, held, touched = self._core.step(command.linear, command.angular, duration)
+        self._held = held
+        self._touched = touched
         times = self._time + duration * np.arange(1, len(robot) + 1) / len(robot)
         self._time += duration
         times[-1] = self._time

@@ -28,7 +28,7 @@ struct ContactPoints {
   Point points[2];
 };
 
-/// Its functions, in the order of `kChipmunkNames`.
+/// Its functions; pymunk_bodies.py has their names, in this order.
 struct Chipmunk {
   void (*step)(cpSpace*, double);
   void (*set_collision_bias)(cpSpace*, double);
@@ -53,17 +53,6 @@ struct Chipmunk {
   ContactPoints (*contact_points)(cpArbiter*);
 };
 
-inline constexpr std::array kChipmunkNames{
-    "cpSpaceStep",        "cpSpaceSetCollisionBias",  "cpSpaceEachCachedArbiter",
-    "cpSpaceAddBody",     "cpSpaceRemoveBody",        "cpSpaceAddShape",
-    "cpSpaceRemoveShape", "cpBodyGetPosition",        "cpBodyGetAngle",
-    "cpBodyGetVelocity",  "cpBodyGetAngularVelocity", "cpBodySetPosition",
-    "cpBodySetAngle",     "cpBodySetVelocity",        "cpBodySetAngularVelocity",
-    "cpBodySetForce",     "cpBodySetTorque",          "cpBodyUpdatePosition",
-    "cpArbiterGetCount",  "cpArbiterGetDepth",        "cpArbiterGetContactPointSet",
-};
-static_assert(sizeof(Chipmunk) == kChipmunkNames.size() * sizeof(void*));
-
 /// Addresses in the engine, which somebody else keeps alive.
 struct ChipmunkHandles {
   cpSpace* space;                // with what is static
@@ -81,13 +70,10 @@ struct StaticContacts {
   double depth = 0.0;  // deepest overlap of the robot in the last substep [m]
 };
 
-/// Functions that the engine calls when a pair begins to touch, touches and no longer touches.
-struct ContactCallbacks {
-  using Callback = void (*)(cpArbiter*, cpSpace*, void* static_contacts);
-  Callback begin;
-  Callback touch;  // nullptr if nothing is to be done
-  Callback end;
-};
+/// What the engine calls when a pair begins to touch, touches, and no longer touches, if anything.
+/// The last argument is the address of a `StaticContacts`.
+using ContactCallbacks = std::array<void (*)(cpArbiter*, cpSpace*, void*), 3>;
+
 /// For pairs of the robot, or else an object, and a fixed object, or else what is static.
 ContactCallbacks contact_callbacks(bool of_robot, bool with_fixed);
 

@@ -20,6 +20,14 @@ struct PlanarSettings {
   bool holds;        // true if the robot keeps its direction while it turns
 };
 
+/// What happened in a step.
+struct PlanarRecord {
+  std::vector<Pose> robot;    // (T,)
+  std::vector<Pose> objects;  // (T, K), one time after the other
+  bool held = false;          // true if the robot was kept from moving as commanded
+  bool touched = false;       // true if it touched something static
+};
+
 /// What moves in a scene, and how. The arrays behind it and the states have to outlive it.
 class PlanarSimulator {
  public:
@@ -38,14 +46,8 @@ class PlanarSimulator {
   /// Time [s], at most `limit`, in which the robot certainly touches nothing at this velocity.
   double clear_for(double linear, double angular, double limit);
 
-  /// (T,) poses of the robot during the last step.
-  std::span<const Pose> robot_path() const { return robot_path_; }
-  /// (T, K) poses of the objects, one time after the other.
-  std::span<const Pose> object_paths() const { return object_paths_; }
-  /// True if the robot was kept from moving as commanded in the last step.
-  bool held() const { return held_; }
-  /// True if the robot touched something static in the last step.
-  bool touched() const { return touched_; }
+  /// What happened in the last step or sweep.
+  const PlanarRecord& record() const { return record_; }
   /// The record of contacts; its address is for the engine's callbacks.
   StaticContacts& contacts() { return scene_.contacts(); }
   /// Number of objects that the engine simulated in the last step that needed it.
@@ -60,6 +62,7 @@ class PlanarSimulator {
   template <class Run>
   void simulate(Index samples, Run run);
   void glide(const ArcMotion& motion, double duration, Index samples);
+  void start_record();
   void stop_objects();
   void look_at_objects();
   void choose(double reach, double duration);
@@ -72,8 +75,7 @@ class PlanarSimulator {
   Momentum momentum_;
   PlanarSettings settings_;
   std::span<BodyState> states_;
-  bool held_ = false;
-  bool touched_ = false;
+  PlanarRecord record_;
   bool rolls_ = false;          // true if an object moves
   std::vector<Pose> poses_;     // (K,) of the objects before a step
   std::vector<double> speeds_;  // (K,) of their fastest points [m/s]
@@ -83,8 +85,6 @@ class PlanarSimulator {
   std::vector<Index> active_;      // objects that are loaded
   std::vector<BodyState> start_;   // (1 + A,) states in the engine
   std::vector<BodyState> driven_;  // (T, 1 + A) of its samples
-  std::vector<Pose> robot_path_;
-  std::vector<Pose> object_paths_;
 };
 
 }  // namespace pushplan
