@@ -63,11 +63,10 @@ struct ChipmunkHandles {
 /// What its callbacks record about the contacts of moving and static shapes.
 struct StaticContacts {
   const Chipmunk* engine;
-  Index objects = 0;  // touching pairs of an object and something static or fixed
-  Index robot = 0;    // those of the robot
-  bool touched =
-      false;           // true if the robot has touched something static since the scene was loaded
-  double depth = 0.0;  // deepest overlap of the robot in the last substep [m]
+  Index objects = 0;     // touching pairs of an object and something static or fixed
+  Index robot = 0;       // those of the robot
+  bool touched = false;  // true if the robot has touched something static since the last `load`
+  double depth = 0.0;    // deepest overlap of the robot in the last substep [m]
 };
 
 /// What the engine calls when a pair begins to touch, touches, and no longer touches, if anything.
