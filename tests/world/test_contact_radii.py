@@ -41,7 +41,7 @@ def test_outlines_grow_and_masses_do_not() -> None:
     np.testing.assert_array_equal(grown.masses, plain.masses)
     np.testing.assert_array_equal(grown.outline(0), plain.outline(0))
     np.testing.assert_array_equal(grown.outline(1), grown_outline(TRIANGLE, 0.1))
-    np.testing.assert_array_equal(grown.drawn_outline(1), TRIANGLE)
+    np.testing.assert_array_equal(grown.drawn_parts(1)[0], TRIANGLE)
     assert grown.radii[1] > plain.radii[1] + 0.1 and grown != plain
     assert plain.vertices is plain.drawn_vertices
     robot = make_robot(contact_radius=0.05)
@@ -54,8 +54,8 @@ def test_many_outlines_grow_as_each_does() -> None:
     drawn = movables.drawn_vertices, movables.drawn_offsets
     vertices, offsets = grown_outlines(*drawn, movables.contact_radii)
     for k, radius in enumerate(movables.contact_radii.tolist()):
-        alone = grown_outline(movables.drawn_outline(k), radius)
-        expected = movables.drawn_outline(k) if radius == 0.0 else alone
+        alone = grown_outline(movables.drawn_parts(k)[0], radius)
+        expected = movables.drawn_parts(k)[0] if radius == 0.0 else alone
         np.testing.assert_array_equal(vertices[offsets[k] : offsets[k + 1]], expected)
 
 
