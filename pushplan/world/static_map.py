@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike
 from pushplan.errors import InvalidInputError
 from pushplan.world.checked_fields import CheckedFields, Shape
 from pushplan.world.checks import ArrayRecord, FloatArray, array, checked_bounds, frozen
+from pushplan.world.convex_shapes import shapes_of
 from pushplan.world.occupancy_grid import occupancy_polygons, occupied_cells
-from pushplan.world.outline import convex_outlines, listed
+from pushplan.world.outline import listed
 
 CAP_CORNERS = 9
 """Corners of each half circle where a thick segment is turned into a polygon."""
@@ -22,18 +23,19 @@ CAP_CORNERS = 9
 
 @dataclass(frozen=True, eq=False)
 class StaticMap(ArrayRecord, CheckedFields):
-    """Walls and columns: convex polygons and thick segments, in the world frame.
+    """Walls and columns: polygons and thick segments, in the world frame.
 
     Args:
-        polygons: convex outlines, each (N, 2) [m]; cut other shapes into convex parts.
+        polygons: outlines, each (N, 2) [m], or polygons of Shapely; kept as convex parts. Others
+            than convex ones are repaired and cut as `pushplan.world.outline_repair` says.
         segments: (S, 4) centre lines x1, y1, x2, y2 [m].
         radii: (S,) half thickness of each segment [m].
         bounds: (4,) x_min, y_min, x_max, y_max [m]: where planners may look for paths. By
             default the box around everything static.
 
     Raises:
-        InvalidInputError: if an outline is not convex, a radius is negative, or the bounds are
-            empty.
+        InvalidInputError: if an outline crosses itself or has no area, a radius is negative, or
+            the bounds are empty.
     """
 
     field_prefix = "static."
@@ -46,7 +48,7 @@ class StaticMap(ArrayRecord, CheckedFields):
     def __post_init__(self) -> None:
         super().__post_init__()
         put = object.__setattr__
-        put(self, "polygons", tuple(convex_outlines("static.polygons", self.polygons)))
+        put(self, "polygons", tuple(_parts(self.polygons)))
         put(self, "bounds", checked_bounds("static.bounds", self.bounds))
         if (self.radii < 0.0).any():
             raise InvalidInputError(f"static.radii must not be negative, got {self.radii.min()}")
@@ -72,7 +74,7 @@ class StaticMap(ArrayRecord, CheckedFields):
                 f"static.radii must be one number or {len(lines)} of them, got {radii!r}"
             ) from error
         if bounds is None:
-            polygons = convex_outlines("static.polygons", polygons)
+            polygons = _parts(polygons)
             ends = lines.reshape(-1, 2)
             reach = np.repeat(thick, 2)[:, None]
             every = np.concatenate([*polygons, ends - reach, ends + reach])
@@ -139,6 +141,10 @@ class StaticMap(ArrayRecord, CheckedFields):
             for line, radius in zip(self.segments, self.radii, strict=True)
         ]
         return (*self.polygons, *ends)
+
+
+def _parts(polygons: Sequence[Any]) -> list[FloatArray]:
+    return [part for parts in shapes_of("static.polygons", polygons) for part in parts]
 
 
 def capsule(a: FloatArray, b: FloatArray, radius: float) -> FloatArray:

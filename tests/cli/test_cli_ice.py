@@ -24,7 +24,7 @@ def test_a_field_is_made_checked_and_drawn(
     assert said.startswith(f"{len(field)} floes, concentration 30.00 %\n")
     assert f"wrote {out}\n" in said
     assert field.bounds.tolist() == [0.0, 0.0, 12.0, 20.0]
-    assert min(corners[:, 1].min() for corners in field.polygons) > 2.0
+    assert min(corners[:, 1].min() for (corners,) in field.floes) > 2.0
     assert Image.open(picture).size == (600, 1000)
     assert main(["ice", "--check", str(out), "--out", str(again)]) == 0
     assert load_ice(again) == field

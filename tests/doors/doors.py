@@ -100,7 +100,7 @@ def _ice(folder: Path, ending: str) -> tuple[Path, bytes]:
     field = IceField((SQUARE + 1.0, SQUARE + 3.0), np.array([0.0, 0.0, 5.0, 5.0]))
     path = folder / f"ice{ending}"
     if ending == ".npy":
-        np.save(path, np.stack(field.polygons))
+        np.save(path, np.stack([floe for (floe,) in field.floes]))
     else:
         save_ice(field, path)
     return path, path.read_bytes()

@@ -190,7 +190,7 @@ def test_ice_from_a_file(tmp_path):
     starts = []
     for seed in range(5):
         world = ship.start(stream(seed, "layout"))
-        for k, corners in enumerate(field.polygons):
+        for k, (corners,) in enumerate(field.floes):
             np.testing.assert_allclose(world.movables.outline_world(k), corners, atol=1e-12)
         hull = shapely.Polygon(world.robot_outline_world()[0])
         assert min(floe.distance(hull) for floe in floes(world)) > 0.0

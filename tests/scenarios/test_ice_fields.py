@@ -31,7 +31,7 @@ def ice(concentration, seed=0, **options):
 
 
 def shapes(field):
-    return np.array([shapely.Polygon(corners) for corners in field.polygons], dtype=object)
+    return np.array([shapely.Polygon(corners) for (corners,) in field.floes], dtype=object)
 
 
 def least_gap(field):
@@ -53,7 +53,7 @@ def test_concentration_is_exact_and_nothing_overlaps(concentration):
         assert area == pytest.approx(concentration * 480.0, rel=1e-9)
         assert field.concentration == pytest.approx(concentration, rel=1e-9)
         assert least_gap(field) > 0.0098  # 3 % of the mean radius
-        for k, corners in enumerate(field.polygons):
+        for k, (corners,) in enumerate(field.floes):
             convex_outline(f"floe {k}", corners)
             assert (corners >= 0.0).all() and (corners <= (12.0, 40.0)).all()
 
@@ -82,7 +82,7 @@ def test_low_concentrations_have_clumps_and_open_water():
         ratios = []
         for seed in range(8):
             found = ice(0.1, seed, clumping=clumping)
-            centres = np.array([corners.mean(axis=0) for corners in found.polygons])
+            centres = np.array([corners.mean(axis=0) for (corners,) in found.floes])
             counts = np.histogram2d(*centres.T, bins=(3, 10), range=((0, 12), (0, 40)))[0]
             ratios.append(counts.var() / counts.mean())
         return np.mean(ratios)
@@ -156,13 +156,13 @@ def test_the_same_seed_gives_the_same_bytes_in_every_process():
         "import hashlib, numpy as np; from pushplan.scenarios import generate_ice;"
         "from pushplan.world import stream;"
         "f = generate_ice(stream(7, 'ice'), bounds=(0, 0, 12, 40), concentration=0.4);"
-        "print(hashlib.sha256(np.concatenate(f.polygons).tobytes()).hexdigest())"
+        "print(hashlib.sha256(np.concatenate([p for p, in f.floes]).tobytes()).hexdigest())"
     )
     environment = {**os.environ, "PYTHONHASHSEED": "5", "OPENBLAS_NUM_THREADS": "1"}
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment
     )
-    here = np.concatenate(ice(0.4, 7).polygons).tobytes()
+    here = np.concatenate([floe for (floe,) in ice(0.4, 7).floes]).tobytes()
     assert done.stdout.strip() == hashlib.sha256(here).hexdigest()
     assert ice(0.4, 7) == ice(0.4, 7) != ice(0.4, 8)
 

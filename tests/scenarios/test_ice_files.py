@@ -1,6 +1,7 @@
 """Fields of broken ice in files, and files that mean no good."""
 
 import io
+import itertools
 import json
 import os
 import pickle
@@ -8,9 +9,11 @@ import zipfile
 
 import numpy as np
 import pytest
+import shapely
 
 from pushplan.scenarios import IceField, generate_ice, load_ice, save_ice
 from pushplan.world import InvalidInputError, PushplanError, SchemaError, stream
+from pushplan.world.outline_repair import OutlineWarning
 
 BASIN = (0.0, 0.0, 12.0, 40.0)
 SQUARE = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
@@ -50,12 +53,17 @@ def test_plain_lists_and_arrays(tmp_path):
     assert load_ice(tmp_path / "ice.npy") == IceField(tuple(squares), (0.0, 0.0, 4.0, 4.0))
 
 
-def test_hulls_only_when_asked_for(tmp_path):
+def test_floes_of_any_shape_and_their_hulls(tmp_path):
     path = tmp_path / "ice.json"
-    path.write_text(json.dumps([np.add(SQUARE, 5.0).tolist(), ARROW]))
-    with pytest.raises(InvalidInputError, match=r"ice\.json: polygon 1 must be convex.*hull=True"):
-        load_ice(path)
-    assert load_ice(path, hull=True).areas.tolist() == [1.0, 2.0]
+    pair = [np.add(SQUARE, (8.0, 0.0)).tolist(), np.add(SQUARE, (10.0, 0.0)).tolist()]
+    path.write_text(json.dumps([np.add(SQUARE, 5.0).tolist(), ARROW, pair]))
+    field = load_ice(path)
+    assert field.areas.tolist() == pytest.approx([1.0, 1.2, 2.0])
+    assert [len(parts) for parts in field.floes] == [1, 2, 2]
+    for name in ("again.json", "again.npz"):
+        save_ice(field, tmp_path / name)
+        assert load_ice(tmp_path / name) == field
+    assert load_ice(path, hull=True).areas.tolist() == pytest.approx([1.0, 2.0, 3.0])
 
 
 def test_fields_of_the_national_research_council(tmp_path):
@@ -79,14 +87,23 @@ def test_fields_of_the_national_research_council(tmp_path):
         load_ice(path)
 
 
-def test_overlapping_floes_are_refused_and_touching_ones_are_not(tmp_path):
+def test_overlapping_floes_are_moved_apart_and_touching_ones_are_not(tmp_path):
     path = tmp_path / "ice.json"
-    polygons = [SQUARE, np.add(SQUARE, (1.0, 0.0)).tolist(), np.add(SQUARE, (0.5, 0.5)).tolist()]
-    path.write_text(json.dumps(polygons))
-    with pytest.raises(InvalidInputError, match=r"\d and 2 share 0\.25 m², the most of 2 pairs"):
+    polygons = [SQUARE, np.add(SQUARE, (1.0, 0.0)).tolist(), np.add(SQUARE, (0.9, 0.5)).tolist()]
+    path.write_text(json.dumps({"polygons": polygons, "bounds": [0, 0, 4, 4]}))
+    with pytest.warns(OutlineWarning, match="2 pairs of floes overlapped: 3 of 3 floes were moved"):
+        field = load_ice(path)
+    shapes = [shapely.Polygon(floe) for (floe,) in field.floes]
+    assert not any(a.overlaps(b) for a, b in itertools.combinations(shapes, 2))
+    assert field.areas.tolist() == pytest.approx([1.0] * 3)
+    assert shapely.union_all(shapes).area == pytest.approx(3.0)
+    kept = load_ice(path, overlaps=True)
+    assert np.array_equal([floe for (floe,) in kept.floes], polygons)
+    path.write_text(json.dumps({"polygons": polygons, "bounds": [0, 0, 2, 1.5]}))
+    with pytest.raises(InvalidInputError, match="no room to move them apart.*--overlaps"):
         load_ice(path)
     path.write_text(json.dumps(polygons[:2]))
-    assert len(load_ice(path)) == 2
+    assert np.array_equal([floe for (floe,) in load_ice(path).floes], polygons[:2])
 
 
 @pytest.mark.parametrize(
@@ -108,7 +125,7 @@ def test_overlapping_floes_are_refused_and_touching_ones_are_not(tmp_path):
         ("[[[0, 0], [1, 0]]]", "polygon 0 must have at least 3 corners"),
         ("[[]]", "polygon 0 must have at least 3 corners"),
         ("[[[0, 0], [1, 0], [2, 0]]]", "polygon 0 must have an area"),
-        ("[[[0, 0], [2, 0], [0, 2], [2, 2]]]", "polygon 0 must be convex"),
+        ("[[[0, 0], [2, 0], [0, 2], [2, 2]]]", "polygon 0 crosses itself"),
         (
             '{"polygons": [[[0, 0], [1, 0], [1, 1]]], "bounds": [0, 0, 0.5, 2]}',
             "polygon 0 must lie",

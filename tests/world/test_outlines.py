@@ -53,7 +53,7 @@ def on_a_robot(corners: object) -> np.ndarray:
 def in_a_field(corners: object, folder: Path) -> np.ndarray:
     path = folder / "field.json"
     path.write_text(json.dumps([corners]))
-    return load_ice(path).polygons[0]
+    return load_ice(path).floes[0][0]
 
 
 def seen(corners: object) -> np.ndarray:
@@ -73,7 +73,7 @@ DOORS = {
     "robot": on_a_robot,
     "receptacle": lambda c: Receptacle(c).polygon,
     "target": lambda c: as_target([c]).parts[0],
-    "ice": lambda c: IceField((c,), [-9, -9, 9, 9]).polygons[0],
+    "ice": lambda c: IceField((c,), [-9, -9, 9, 9]).floes[0][0],
     "tracker": seen,
 }  # fmt: skip
 
@@ -89,15 +89,31 @@ def test_every_door_takes_outlines_as_other_programs_draw_them(door, tmp_path):
         assert shapely.hausdorff_distance(shapely.Polygon(found), expected) < 1e-5, how
 
 
-@pytest.mark.parametrize("door", [*DOORS, "ice file"])
-def test_every_door_refuses_a_dent_in_the_same_words(door, tmp_path):
-    read = DOORS.get(door, lambda corners: in_a_field(corners, tmp_path))
-    dented = np.insert(HEXAGON, 3, [-1.4, 0.8], axis=0).tolist()
-    if door == "tracker":  # which takes the hulls of what a camera sees
-        assert signed_area(read(dented)) == pytest.approx(signed_area(HEXAGON))
-        return
+ANY_SHAPE = {
+    "world file, polygon": lambda c: movables_from_list([{"polygon": c}]).parts_world(0),
+    "movables": lambda c: Movables.from_polygons([c]).parts_world(0),
+    "static": lambda c: StaticMap.build([c]).polygons,
+    "ice": lambda c: IceField((c,), [-9, -9, 9, 9]).floes[0],
+}
+DENTED = np.insert(HEXAGON, 3, [-1.4, 0.8], axis=0)
+
+
+@pytest.mark.parametrize("door", ANY_SHAPE)
+def test_doors_of_what_is_pushed_or_stands_take_a_dent(door):
+    parts = ANY_SHAPE[door](DENTED.tolist())
+    assert len(parts) > 1
+    union = shapely.union_all([shapely.Polygon(part) for part in parts])
+    assert union.symmetric_difference(shapely.Polygon(DENTED)).area < 1e-9
+
+
+@pytest.mark.parametrize("door", ["robot", "receptacle", "target", "flattened movables"])
+def test_the_other_doors_refuse_a_dent_in_the_same_words(door):
     with pytest.raises(InvalidInputError, match="must be convex: split it into convex parts"):
-        read(dented)
+        DOORS[door](DENTED.tolist())
+
+
+def test_the_tracker_takes_the_hull_of_what_a_camera_sees():
+    assert signed_area(seen(DENTED)) == pytest.approx(signed_area(HEXAGON))
 
 
 def test_good_outlines_stay_as_they_are():

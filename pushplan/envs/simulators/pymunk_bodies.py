@@ -134,9 +134,9 @@ class PymunkBodies:
         return shapes
 
     def _make_objects(self, world: World, friction: float) -> list[tuple[Any, list[Any]]]:
-        """Make the body and the shapes of each object, which takes Pymunk's classes four times as long.
+        """Make the body and the shapes of each object.
 
-        There may be hundreds of floes of which the engine needs a few dozen.
+        Pymunk's classes take four times as long. There may be hundreds of floes of which the engine needs a few dozen.
         """
         ffi = self._ffi
         lib = self._lib
