@@ -58,7 +58,7 @@ def test_floes_of_any_shape_and_their_hulls(tmp_path):
     pair = [np.add(SQUARE, (8.0, 0.0)).tolist(), np.add(SQUARE, (10.0, 0.0)).tolist()]
     path.write_text(json.dumps([np.add(SQUARE, 5.0).tolist(), ARROW, pair]))
     field = load_ice(path)
-    assert field.areas.tolist() == pytest.approx([1.0, 1.2, 2.0])
+    assert field.areas.tolist() == pytest.approx([1.0, 1.1, 2.0])
     assert [len(parts) for parts in field.floes] == [1, 2, 2]
     for name in ("again.json", "again.npz"):
         save_ice(field, tmp_path / name)
@@ -91,7 +91,7 @@ def test_overlapping_floes_are_moved_apart_and_touching_ones_are_not(tmp_path):
     path = tmp_path / "ice.json"
     polygons = [SQUARE, np.add(SQUARE, (1.0, 0.0)).tolist(), np.add(SQUARE, (0.9, 0.5)).tolist()]
     path.write_text(json.dumps({"polygons": polygons, "bounds": [0, 0, 4, 4]}))
-    with pytest.warns(OutlineWarning, match="2 pairs of floes overlapped: 3 of 3 floes were moved"):
+    with pytest.warns(OutlineWarning, match="2 pairs of floes overlapped: 1 of 3 floes were moved"):
         field = load_ice(path)
     shapes = [shapely.Polygon(floe) for (floe,) in field.floes]
     assert not any(a.overlaps(b) for a, b in itertools.combinations(shapes, 2))
@@ -100,7 +100,7 @@ def test_overlapping_floes_are_moved_apart_and_touching_ones_are_not(tmp_path):
     kept = load_ice(path, overlaps=True)
     assert np.array_equal([floe for (floe,) in kept.floes], polygons)
     path.write_text(json.dumps({"polygons": polygons, "bounds": [0, 0, 2, 1.5]}))
-    with pytest.raises(InvalidInputError, match="no room to move them apart.*--overlaps"):
+    with pytest.raises(InvalidInputError, match=r"no room to move them apart.*--overlaps"):
         load_ice(path)
     path.write_text(json.dumps(polygons[:2]))
     assert np.array_equal([floe for (floe,) in load_ice(path).floes], polygons[:2])

@@ -50,7 +50,7 @@ LIMITS = {"mass": 1.0, "drive": "differential", "max_speed": 1.0, "max_turn_rate
         (lambda: make_boxes([[0, 0, NAN]]), "finite"),
         (lambda: Movables.from_polygons([[[0, 0], [1, 1]]]), "at least 3 corners"),
         (lambda: Movables.from_polygons([[[0, 0], [1, 1], [2, 2]]]), "area"),
-        (lambda: Movables.from_polygons([[[0, 0], [2, 0], [0.5, 0.5], [0, 2]]]), "convex"),
+        (lambda: Movables.from_polygons([[[0, 0], [2, 0], [0, 2], [2, 2]]]), "crosses itself"),
         (lambda: Movables.from_polygons([[[0, 0], [1, 0], [1, 0], [0, 0]]]), "3 corners"),
         (lambda: Movables.from_polygons([[[0, 0], [1, 0], [1e80, 1]]]), "within 1e+70 m"),
         (lambda: Movables.from_polygons(3), "list of outlines, got 3"),

@@ -136,7 +136,8 @@ class PymunkBodies:
     def _make_objects(self, world: World, friction: float) -> list[tuple[Any, list[Any]]]:
         """Make the body and the shapes of each object.
 
-        Pymunk's classes take four times as long. There may be hundreds of floes of which the engine needs a few dozen.
+        Pymunk's classes take four times as long, and there may be hundreds of floes of which the
+        engine needs a few dozen.
         """
         ffi = self._ffi
         lib = self._lib
