@@ -47,7 +47,7 @@ def load_ice(path: str | Path, *, hull: bool = False, overlaps: bool = False) ->
     Floes need not be convex; a list of outlines in place of one is a floe of several parts. They
     are repaired and cut into convex parts as `pushplan.world.outline_repair.outline_parts` says.
     Those that overlap are moved apart: again and again each pair by the least translation that
-    separates it, the lighter floe more, and back into the bounds. An `OutlineWarning` says how far.
+    separates it, the lighter floe more, and back into stated bounds. An `OutlineWarning` says how far.
     Without bounds, the rectangle around all floes counts.
 
     Args:
@@ -77,7 +77,7 @@ def load_ice(path: str | Path, *, hull: bool = False, overlaps: bool = False) ->
         floes = _floes(polygons, hull)
         field = IceField(floes, _bounds(floes, bounds))
         _check_inside(field)
-        return field if overlaps else _apart(field)
+        return field if overlaps else _apart(field, is_bounded=bounds is not None)
     except InvalidInputError as error:
         raise InvalidInputError(f"{path}: {error}") from error
 
@@ -216,8 +216,8 @@ def _check_inside(field: IceField) -> None:
         )
 
 
-def _apart(field: IceField) -> IceField:
-    """The field with floes that overlap moved apart; touching is fine."""
+def _apart(field: IceField, is_bounded: bool) -> IceField:
+    """The field with floes that overlap moved apart, if need be beyond bounds that nobody gave."""
     boxes = _boxes(field.floes)
     shifts = np.zeros((len(field), 2))
     pairs = _overlaps(field, boxes, shifts)
@@ -230,7 +230,9 @@ def _apart(field: IceField) -> IceField:
             way = (depth + _GAP * min(field.radii[a], field.radii[b])) * normal
             shifts[a] -= share * way
             shifts[b] += (1.0 - share) * way
-        shifts = np.clip(shifts, field.bounds[:2] - boxes[:, :2], field.bounds[2:] - boxes[:, 2:])
+        if is_bounded:
+            room = (field.bounds[:2] - boxes[:, :2], field.bounds[2:] - boxes[:, 2:])
+            shifts = np.clip(shifts, *room)
         pairs = _overlaps(field, boxes, shifts)
     if pairs:
         a, b, depth, _ = max(pairs, key=itemgetter(2))
@@ -253,7 +255,7 @@ def _apart(field: IceField) -> IceField:
         tuple(part + shift for part in parts) if moved[k] else parts
         for k, (parts, shift) in enumerate(zip(field.floes, shifts, strict=True))
     ]
-    return IceField(tuple(floes), field.bounds)
+    return IceField(tuple(floes), _bounds(floes, field.bounds if is_bounded else None))
 
 
 def _overlaps(

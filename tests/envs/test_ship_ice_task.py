@@ -21,6 +21,7 @@ from pushplan.world.outline import signed_area
 PRESETS = ("benchmark", "full_scale")
 BENCHMARK, FULL_SCALE = (ship_ice.PRESETS[name] for name in PRESETS)
 UP = math.pi / 2.0
+from pushplan.world.outline_repair import OutlineWarning
 
 
 def task(preset="benchmark", **variations):
@@ -204,10 +205,13 @@ def test_ice_from_a_file(tmp_path):
 def test_ice_from_a_file_may_be_as_a_camera_sees_it(tmp_path):
     path = tmp_path / "seen.json"
     path.write_text("[[[1,9],[3,9],[2,9.5],[3,11],[1,11]], [[2.9,9],[4,9],[4,11],[2.9,11]]]")
-    with pytest.raises(ScenarioError, match="ice_hull"):
-        task(ice_file=str(path))
-    with pytest.raises(ScenarioError, match="ice_overlaps"):
-        task(ice_file=str(path), ice_hull=True)
+    with pytest.warns(OutlineWarning, match="1 pairs of floes overlapped"):
+        world = task(ice_file=str(path)).start(stream(0, "layout"))
+    assert [len(world.movables.parts(k)) for k in range(2)] == [2, 1]
+    a, b = (
+        shapely.union_all(list(map(shapely.Polygon, world.movables.parts_world(k)))) for k in (0, 1)
+    )
+    assert a.area == pytest.approx(3.0) and b.area == pytest.approx(2.2) and not a.overlaps(b)
     ship = task(ice_file=str(path), ice_hull=True, ice_overlaps=True)
     assert len(ship.start(stream(0, "layout")).movables) == 2
 
