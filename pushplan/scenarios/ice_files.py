@@ -47,8 +47,8 @@ def load_ice(path: str | Path, *, hull: bool = False, overlaps: bool = False) ->
     Floes need not be convex; a list of outlines in place of one is a floe of several parts. They
     are repaired and cut into convex parts as `pushplan.world.outline_repair.outline_parts` says.
     Those that overlap are moved apart: again and again each pair by the least translation that
-    separates it, the lighter floe more, and back into stated bounds. An `OutlineWarning` says how far.
-    Without bounds, the rectangle around all floes counts.
+    separates it, the lighter floe more, and back into stated bounds. An `OutlineWarning` says how
+    far. Without bounds, the rectangle around all floes counts.
 
     Args:
         path: the file.

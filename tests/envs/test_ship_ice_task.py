@@ -17,11 +17,11 @@ from pushplan.envs.tasks.ship_ice import ShipIceTask
 from pushplan.scenarios import Scenario, generate_ice, save_ice
 from pushplan.world import ScenarioError, UnknownNameError, stream
 from pushplan.world.outline import signed_area
+from pushplan.world.outline_repair import OutlineWarning
 
 PRESETS = ("benchmark", "full_scale")
 BENCHMARK, FULL_SCALE = (ship_ice.PRESETS[name] for name in PRESETS)
 UP = math.pi / 2.0
-from pushplan.world.outline_repair import OutlineWarning
 
 
 def task(preset="benchmark", **variations):
