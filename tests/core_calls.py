@@ -26,6 +26,7 @@ import numpy as np
 # They are called with wrong types only, which nanobind refuses, and not with right ones.
 TABLES_OF_ONE_MAKER = {
     "control.TrackingAssembly": "arrays of one number of steps, which only tests hand over",
+    "envs.PlanarSimulator": "addresses of an engine, and states of its bodies",
     "gtsp.Problem.__init__": "tables that gtsp makes of one checked graph",
     "gtsp.RuinRecreate.narrow": "a part of the same tables",
     "gtsp.extend_paths": "walks of gtsp, in the order in which it numbers clusters",
@@ -131,7 +132,6 @@ VALID: dict[str, Any] = {
     "seed": 3,
     "memory": 1.0,
     # geometry
-    "envs.Reach.struck.paths": np.zeros((3, 2, 3)),
     "geometry.transform_outlines.out": np.zeros((8, 2)),
     "geometry.Obstacles.free_points.box": WIDE,
     "geometry.Obstacles.fill_clearance.out": np.zeros((4, 4)),

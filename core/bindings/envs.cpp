@@ -1,11 +1,41 @@
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+#include <algorithm>
+#include <bit>
+
 #include "arrays.hpp"
-#include "pushplan/envs/momentum.hpp"
-#include "pushplan/envs/reach.hpp"
+#include "pushplan/envs/planar_simulator.hpp"
 #include "pushplan/envs/water.hpp"
 
 namespace pushplan::bindings {
 
 using namespace nb::literals;
+
+namespace {
+
+using Address = std::uintptr_t;
+using Functions = std::array<Address, sizeof(Chipmunk) / sizeof(Address)>;
+
+template <class T>
+std::vector<T*> pointers(const std::vector<Address>& addresses) {
+  std::vector<T*> found;
+  for (const Address address : addresses) found.push_back(std::bit_cast<T*>(address));
+  return found;
+}
+
+/// What a simulator recorded in its last step: (T, 3) poses of the robot, (T, K, 3) of the objects.
+auto recorded(const PlanarSimulator& simulator) {
+  const auto& [robot, objects, held, touched] = simulator.record();
+  const auto poses = zeros<double, 2>({robot.size(), 3});
+  const auto paths = zeros<double, 3>({robot.size(), simulator.count(), 3});
+  std::ranges::copy(robot, reinterpret_cast<Pose*>(poses.data()));
+  std::ranges::copy(objects, reinterpret_cast<Pose*>(paths.data()));
+  return std::tuple(poses, paths, held, touched);
+}
+
+}  // namespace
 
 void bind_envs(nb::module_& module) {
   module.def(
@@ -13,9 +43,13 @@ void bind_envs(nb::module_& module) {
       [](const Poses& velocities, const Floats<1>& keeps, const Floats<2>& drag, double h) {
         require_count("keeps", keeps.shape(0), velocities.shape(0));
         require_count("drag", drag.shape(0), velocities.shape(0));
+        const Momentum momentum{view(keeps), {}, rows_as<const BodyDrag>(drag)};
         const auto kept = zeros<double, 2>({velocities.shape(0), 3});
-        slow_down(rows_as<const Twist>(velocities), view(keeps), rows_as<const BodyDrag>(drag), h,
-                  rows_as<Twist>(kept));
+        const auto before = rows_as<const Twist>(velocities);
+        const auto after = rows_as<Twist>(kept);
+        for (std::size_t i = 0; i < before.size(); ++i) {
+          after[i] = momentum.after(static_cast<Index>(i), before[i], h);
+        }
         return kept;
       },
       "velocities"_a.noconvert(), "keeps"_a.noconvert(), "drag"_a.noconvert(), "h"_a);
@@ -43,53 +77,64 @@ void bind_envs(nb::module_& module) {
           "parts"_a.noconvert(), "part_offsets"_a.noconvert(), "vertices"_a.noconvert(),
           "offsets"_a.noconvert(), "radii"_a.noconvert(), nb::keep_alive<1, 2>(),
           nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>(), nb::keep_alive<1, 5>(),
-          nb::keep_alive<1, 6>())
-      .def(
-          "within",
-          [](Reach& self, const OnePose& robot, double reach, const Poses& objects,
-             const Floats<1>& speeds) {
-            require_count("poses", objects.shape(0), self.count());
-            require_count("speeds", speeds.shape(0), self.count());
-            const auto found = zeros<bool, 1>({objects.shape(0)});
-            self.within(pose(robot), reach, poses(objects), view(speeds), view(found));
-            return found;
-          },
-          "robot"_a.noconvert(), "reach"_a, "poses"_a.noconvert(), "speeds"_a.noconvert())
-      .def(
-          "clear_time",
-          [](Reach& self, const OnePose& robot, double course, double linear, double angular,
-             bool holds, double limit, double margin, const Poses& objects,
-             const Obstacles& obstacles) {
-            require_count("poses", objects.shape(0), self.count());
-            return self.clear_time(pose(robot), {course, linear, angular, holds}, limit, margin,
-                                   poses(objects), obstacles);
-          },
-          "robot"_a.noconvert(), "course"_a, "linear"_a, "angular"_a, "holds"_a, "limit"_a,
-          "margin"_a, "poses"_a.noconvert(), "obstacles"_a, ReleaseGil(),
-          "Time [s] for which a robot that drives an arc certainly touches nothing.")
-      .def(
-          "struck",
-          [](Reach& self, const Array<const bool, 1>& loaded, const Floats<3>& paths,
-             const Poses& before) {
-            require_count("before", before.shape(0), self.count());
-            require_count("loaded", loaded.shape(0), self.count());
-            require_room("paths", paths.shape(0), 1);
-            require_count("columns of paths", paths.shape(1), self.count());
-            const auto found = zeros<bool, 1>({before.shape(0)});
-            self.struck(view(loaded), grid_as<const Pose>(paths), poses(before), view(found));
-            return found;
-          },
-          "loaded"_a.noconvert(), "paths"_a.noconvert(), "before"_a.noconvert());
+          nb::keep_alive<1, 6>());
 
+  module.def("contact_points_size", [] { return sizeof(ContactPoints); });
   module.def(
-      "arc_pose",
-      [](const OnePose& start, double course, double linear, double angular, bool holds,
-         double time, const OnePoseOut& out) {
-        *reinterpret_cast<Pose*>(out.data()) =
-            arc_pose(pose(start), {course, linear, angular, holds}, time);
+      "contact_callbacks",
+      [](bool of_robot, bool with_fixed) {
+        return std::bit_cast<std::array<Address, 3>>(contact_callbacks(of_robot, with_fixed));
       },
-      "start"_a.noconvert(), "course"_a, "linear"_a, "angular"_a, "holds"_a, "time"_a,
-      "out"_a.noconvert());
+      "of_robot"_a, "with_fixed"_a);
+
+  nb::class_<PlanarSimulator>(module, "PlanarSimulator",
+                              "A robot among objects in a space of Chipmunk.")
+      .def(
+          "__init__",
+          [](PlanarSimulator* self, const Functions& functions, Address space,
+             const std::vector<Address>& bodies, const std::vector<Address>& shapes,
+             const nb::object&, const Reach& reach, const Obstacles& obstacles,
+             const Floats<1>& keeps, const Floats<2>& inertia, const Floats<2>& drag,
+             const FloatsOut<2>& states, double travel, double tolerance, double rest, double decay,
+             Index samples, bool holds) {
+            const ChipmunkHandles handles{std::bit_cast<cpSpace*>(space), pointers<cpBody>(bodies),
+                                          pointers<cpShape>(shapes)};
+            const Momentum momentum{view(keeps), rows_as<const Inertia>(inertia),
+                                    rows_as<const BodyDrag>(drag)};
+            new (self) PlanarSimulator(
+                std::bit_cast<Chipmunk>(functions), handles, reach, obstacles, momentum,
+                {travel, tolerance, rest, decay, samples, holds}, rows_as<BodyState>(states));
+          },
+          "functions"_a, "space"_a, "bodies"_a, "shapes"_a, "owner"_a, "reach"_a, "obstacles"_a,
+          "keeps"_a.noconvert(), "inertia"_a.noconvert(), "drag"_a.noconvert(),
+          "states"_a.noconvert(), "travel"_a, "tolerance"_a, "rest"_a, "decay"_a, "samples"_a,
+          "holds"_a, nb::keep_alive<1, 6>(), nb::keep_alive<1, 7>(), nb::keep_alive<1, 8>(),
+          nb::keep_alive<1, 9>(), nb::keep_alive<1, 10>(), nb::keep_alive<1, 11>(),
+          nb::keep_alive<1, 12>())
+      .def(
+          "step",
+          [](PlanarSimulator& self, double linear, double angular, double duration) {
+            self.step(linear, angular, duration);
+            return recorded(self);
+          },
+          "linear"_a, "angular"_a, "duration"_a,
+          "Poses (T, 3) of the robot and (T, K, 3) of the objects in a step; whether the robot was\n"
+          "held, and touched something static.")
+      .def(
+          "sweep",
+          [](PlanarSimulator& self, const OnePose& to, const OnePose& motion, double length,
+             double duration) { return self.sweep(pose(to), pose(motion), length, duration); },
+          "to"_a.noconvert(), "motion"_a.noconvert(), "length"_a, "duration"_a,
+          "Drive straight to a pose; False if the robot was held.")
+      .def("clear_for", &PlanarSimulator::clear_for, "linear"_a, "angular"_a, "limit"_a,
+           "Time [s] for which the robot certainly touches nothing.")
+      .def_prop_ro("loaded", &PlanarSimulator::loaded,
+                   "Number of objects that the last step needed the engine for.")
+      .def_rw("loads_all", &PlanarSimulator::loads_all,
+              "True if objects that cannot move are simulated as well.")
+      .def_prop_ro("contacts", [](PlanarSimulator& self) {
+        return reinterpret_cast<Address>(&self.contacts());
+      });
 }
 
 }  // namespace pushplan::bindings

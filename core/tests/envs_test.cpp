@@ -18,30 +18,31 @@ using namespace tests;
 /// Two half steps are a whole one; without drag nothing changes; drag never turns a body round.
 void drag_is_solved_exactly() {
   Xorshift64Star random(1);
+  const std::array<double, 1> keeps{1.0};
   for (int trial = 0; trial < 200; ++trial) {
-    const std::array<Twist, 1> start{
-        {{between(random, -2.0, 2.0), between(random, -2.0, 2.0), between(random, -2.0, 2.0)}}};
+    const Twist start{between(random, -2.0, 2.0), between(random, -2.0, 2.0),
+                      between(random, -2.0, 2.0)};
     const std::array<BodyDrag, 1> drag{
         {{{random.uniform(), random.uniform()}, {random.uniform(), random.uniform()}}}};
-    const std::array<double, 1> keeps{1.0};
-    std::array<Twist, 1> whole{};
-    std::array<Twist, 1> half{};
-    std::array<Twist, 1> twice{};
-    slow_down(start, keeps, drag, 0.5, whole);
-    slow_down(start, keeps, drag, 0.25, half);
-    slow_down(half, keeps, drag, 0.25, twice);
-    CHECK(near_to(whole[0].vx, twice[0].vx) && near_to(whole[0].omega, twice[0].omega));
-    CHECK(std::abs(whole[0].vx) <= std::abs(start[0].vx) && whole[0].vx * start[0].vx >= 0.0);
-    slow_down(start, keeps, std::array<BodyDrag, 1>{}, 0.5, whole);
-    CHECK(whole[0].vx == start[0].vx && whole[0].omega == start[0].omega);
-    slow_down(start, std::array<double, 1>{0.0}, drag, 0.5, whole);
-    CHECK(whole[0].vx == 0.0 && whole[0].vy == 0.0 && whole[0].omega == 0.0);
+    const Momentum momentum{keeps, {}, drag};
+    const Twist whole = momentum.after(0, start, 0.5);
+    const Twist twice = momentum.after(0, momentum.after(0, start, 0.25), 0.25);
+    CHECK(near_to(whole.vx, twice.vx) && near_to(whole.omega, twice.omega));
+    CHECK(std::abs(whole.vx) <= std::abs(start.vx) && whole.vx * start.vx >= 0.0);
+    const std::array<BodyDrag, 1> none{};
+    CHECK((Momentum{keeps, {}, none}.after(0, start, 0.5) == start));
+    CHECK((Momentum{std::array<double, 1>{0.0}, {}, drag}.after(0, start, 0.5) == Twist{}));
+    // the rate of decay is that of the solution
+    const double h = 1e-6;
+    const Twist soon = momentum.after(0, {start.vx, start.vy, 0.0}, h);
+    const double speed = std::hypot(start.vx, start.vy);
+    const double lost = 1.0 - std::hypot(soon.vx, soon.vy) / speed;
+    CHECK(lost / h < momentum.decay(0, {start.vx, start.vy, 0.0}) + 1e-4);
   }
   const std::array<BodyDrag, 1> quadratic{{{{0.0, 2.0}, {0.0, 0.0}}}};
-  std::array<Twist, 1> out{};
-  slow_down(std::array<Twist, 1>{{{1.0, 0.0, 0.0}}}, std::array<double, 1>{1.0}, quadratic, 0.5,
-            out);
-  CHECK(near_to(out[0].vx, 0.5));  // v / (1 + c v h)
+  const Momentum momentum{keeps, {}, quadratic};
+  CHECK(near_to(momentum.after(0, {1.0, 0.0, 0.0}, 0.5).vx, 0.5));  // v / (1 + c v h)
+  CHECK(near_to(momentum.decay(0, {1.0, 0.0, 0.0}), 2.0));
 }
 
 /// Measures of a square of side 2, and of a polygon that is nearly a disc.

@@ -1,5 +1,6 @@
 """Parts of simulators."""
 
+from collections.abc import Sequence
 from typing import Annotated
 
 import numpy
@@ -20,13 +21,37 @@ class Reach:
 
     def __init__(self, parts: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], part_offsets: Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C', device='cpu', writable=False)], vertices: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], offsets: Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C', device='cpu', writable=False)], radii: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> None: ...
 
-    def within(self, robot: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], reach: float, poses: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu', writable=False)], speeds: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.bool_], dict(shape=(None,), order='C')]: ...
+def contact_points_size() -> int: ...
 
-    def clear_time(self, robot: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], course: float, linear: float, angular: float, holds: bool, limit: float, margin: float, poses: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu', writable=False)], obstacles: pushplan._core.geometry.Obstacles) -> float:
+def contact_callbacks(of_robot: bool, with_fixed: bool) -> list[int]: ...
+
+class PlanarSimulator:
+    """A robot among objects in a space of Chipmunk."""
+
+    def __init__(self, functions: Sequence[int], space: int, bodies: Sequence[int], shapes: Sequence[int], owner: object, reach: Reach, obstacles: pushplan._core.geometry.Obstacles, keeps: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], inertia: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], drag: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], states: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu')], travel: float, tolerance: float, rest: float, decay: float, samples: int, holds: bool) -> None: ...
+
+    def step(self, linear: float, angular: float, duration: float) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C')], bool, bool]:
         """
-        Time [s] for which a robot that drives an arc certainly touches nothing.
+        Poses (T, 3) of the robot and (T, K, 3) of the objects in a step; whether the robot was
+        held, and touched something static.
         """
 
-    def struck(self, loaded: Annotated[NDArray[numpy.bool_], dict(shape=(None,), order='C', device='cpu', writable=False)], paths: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], before: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.bool_], dict(shape=(None,), order='C')]: ...
+    def sweep(self, to: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], motion: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], length: float, duration: float) -> bool:
+        """Drive straight to a pose; False if the robot was held."""
 
-def arc_pose(start: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], course: float, linear: float, angular: float, holds: bool, time: float, out: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu')]) -> None: ...
+    def clear_for(self, linear: float, angular: float, limit: float) -> float:
+        """Time [s] for which the robot certainly touches nothing."""
+
+    @property
+    def loaded(self) -> int:
+        """Number of objects that the last step needed the engine for."""
+
+    @property
+    def loads_all(self) -> bool:
+        """True if objects that cannot move are simulated as well."""
+
+    @loads_all.setter
+    def loads_all(self, arg: bool, /) -> None: ...
+
+    @property
+    def contacts(self) -> int: ...

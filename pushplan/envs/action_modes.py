@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pushplan.envs.tasks.base import Task
 from pushplan.world import Action, InvalidInputError, Twist, UnknownNameError, WheelSpeeds, World
-from pushplan.world.checks import FloatArray
+from pushplan.world.checks import FloatArray, is_finite
 
 Motion = Callable[[FloatArray, float, bool], tuple[Twist, float] | None]
 """Asked while one action lasts, with the robot's pose (3,), the time [s] and whether
@@ -54,7 +54,7 @@ class ActionMode(ABC):
                 f"an action must have shape ({self.size},), got shape {values.shape}: "
                 f"{action!r:.80}"
             )
-        if not np.isfinite(values).all():
+        if not is_finite(values):
             raise InvalidInputError(f"an action must be finite, got {values.tolist()}")
         return np.clip(values, -1.0, 1.0)
 

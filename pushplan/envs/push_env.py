@@ -293,7 +293,6 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         while (wanted := motion(simulator.robot_pose, now, now_held)) is not None:
             command, periods = wanted
             duration = self._stands_for(command, periods)
-            self._meanwhile = self._mode.afterwards(command)
             traces.append(roster.widen(simulator.step(command, duration)))
             now = float(traces[-1].times[-1])
             touched |= simulator.touched_static
@@ -304,6 +303,7 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
                 if len(gone):
                     simulator.remove(gone.tolist())
                     roster.drop(gone)
+        self._meanwhile = self._mode.afterwards(command)
         after = simulator.world()
         self._world = after
         self._trace = Trace.join(traces)

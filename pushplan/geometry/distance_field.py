@@ -64,6 +64,14 @@ class GeodesicField:
         at = number("x", x), number("y", y)
         return core.sample(self.filled, o[0], o[1], self.grid.resolution, *at)
 
+    def sample_each(self, points: FloatArray) -> FloatArray:
+        """(N,) `sample` at each of (N, 2) points."""
+        at: FloatArray = array("points", points, (None, 2))
+        out = np.empty(len(at))
+        o = self.grid.origin
+        core.sample_points(self.filled, o[0], o[1], self.grid.resolution, at, out)
+        return out
+
     def exact(self, x: float, y: float) -> float:
         """Distance to the goal from one point [m], not interpolated; slower than `sample`."""
         return self.source.path_from((x, y)).length

@@ -19,6 +19,8 @@ IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 _T = TypeVar("_T")
 
+_FEW = 64  # numbers whose finiteness Python finds sooner than NumPy
+
 
 def expect(name: str, value: object, kind: type[_T]) -> _T:
     """Check that ``value`` is of a type and return it.
@@ -156,13 +158,20 @@ def array(
         or any(want not in (None, have) for have, want in zip(result.shape, shape, strict=True))
     ):
         raise InvalidInputError(f"{name} must have shape {_shape_text(shape)}, got {result.shape}")
-    if finite and wanted.kind == "f" and not np.isfinite(result).all():
+    if finite and wanted.kind == "f" and not is_finite(result):
         bad = np.argwhere(~np.isfinite(result))[0]
         raise InvalidInputError(
             f"{name} must be finite, got {result[tuple(bad)]} at index {tuple(int(i) for i in bad)}"
         )
     result.flags.writeable = False
     return result
+
+
+def is_finite(values: NDArray[Any]) -> bool:
+    """Return True if every number is finite."""
+    if values.size <= _FEW:
+        return all(map(math.isfinite, values.ravel().tolist()))
+    return bool(np.isfinite(values).all())
 
 
 def checked_bounds(name: str, value: Any) -> FloatArray:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from pushplan.core import envs as core
 from pushplan.envs.simulators.base import Materials
-from pushplan.envs.simulators.pymunk_drive import PymunkOptions
+from pushplan.envs.simulators.pymunk_options import PymunkOptions
 from pushplan.envs.simulators.pymunk_simulator import PymunkSimulator
 from pushplan.envs.simulators.water import Water
 from pushplan.geometry import convex_distance
@@ -202,19 +202,14 @@ def test_leaving_out_what_is_far_changes_nothing(seed, water):
     poses = np.column_stack([grid + rng.uniform(-0.1, 0.1, grid.shape), np.zeros(len(grid))])
     world = make_world(poses, robot_pose=(-1.5, 3.0, 0.0))
     some, everything = afloat(world, water), afloat(world, water)
-    everything._in_reach = lambda reach, own: np.ones(len(poses), dtype=bool)
+    everything._core.loads_all = True
     few = []
-    original = some._driver.run
-
-    def counted(command, duration, start, active, *rest):
-        few.append(len(active))
-        return original(command, duration, start, active, *rest)
-
-    some._driver.run = counted
     for _ in range(25):
         command = Twist(0.3, rng.uniform(-0.2, 0.2))
         some.step(command, 0.8)
+        few.append(some._core.loaded)
         everything.step(command, 0.8)
+        assert everything._core.loaded in (0, len(poses))
     assert np.mean(few) < 0.8 * len(poses)
     moved = np.hypot(*(everything.object_poses - poses)[:, :2].T)
     assert moved.max() > 1.0

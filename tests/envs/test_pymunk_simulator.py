@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 import shapely
 
+from pushplan.envs.simulators import pymunk_bodies
 from pushplan.envs.simulators.base import Materials
 from pushplan.envs.simulators.pymunk_simulator import PymunkOptions, PymunkSimulator
 from pushplan.world import (
     Drive,
     GoalDisc,
     InvalidInputError,
+    MissingDependencyError,
     Movables,
     RobotModel,
     StaticMap,
@@ -263,3 +265,9 @@ def test_bad_options_are_refused(bad):
         PymunkOptions(**bad)
     with pytest.raises(InvalidInputError, match="robot_object"):
         Materials(robot_object=-1.0)
+
+
+def test_a_pymunk_without_access_to_its_engine_is_named(monkeypatch):
+    monkeypatch.setattr(pymunk_bodies, "_FUNCTIONS", ("cpSpaceStep", "cpNoSuchFunction"))
+    with pytest.raises(MissingDependencyError, match=r"cpNoSuchFunction.*7\.3,<8"):
+        built(make_world([(2.0, 0.0, 0.0)]))

@@ -1,5 +1,6 @@
 #include "pushplan/envs/momentum.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace pushplan {
@@ -16,16 +17,20 @@ double kept(double speed, const Drag& drag, double h) {
 
 }  // namespace
 
-void slow_down(std::span<const Twist> velocities, std::span<const double> keeps,
-               std::span<const BodyDrag> drag, double h, std::span<Twist> out) {
-  for (std::size_t i = 0; i < velocities.size(); ++i) {
-    out[i] = {0.0, 0.0, 0.0};
-    if (keeps[i] == 0.0) continue;
-    const Twist v = velocities[i];
-    const double fraction = kept(std::hypot(v.vx, v.vy), drag[i].translation, h);
-    out[i] = {fraction * v.vx, fraction * v.vy,
-              v.omega * kept(std::abs(v.omega), drag[i].rotation, h)};
-  }
+Twist Momentum::after(Index i, const Twist& v, double h) const {
+  const auto body = static_cast<std::size_t>(i);
+  if (keeps[body] == 0.0) return {0.0, 0.0, 0.0};
+  const double fraction = kept(std::hypot(v.vx, v.vy), drag[body].translation, h);
+  return {fraction * v.vx, fraction * v.vy,
+          v.omega * kept(std::abs(v.omega), drag[body].rotation, h)};
+}
+
+double Momentum::decay(Index i, const Twist& v) const {
+  const auto body = static_cast<std::size_t>(i);
+  if (keeps[body] == 0.0 || v == Twist{0.0, 0.0, 0.0}) return 0.0;
+  const auto& [translation, rotation] = drag[body];
+  return std::max(translation.linear + translation.quadratic * std::hypot(v.vx, v.vy),
+                  rotation.linear + rotation.quadratic * std::abs(v.omega));
 }
 
 }  // namespace pushplan

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pushplan.core import envs as core
 from pushplan.core import geometry
 from pushplan.envs.simulators.base import Materials
 from pushplan.world import World
-from pushplan.world.checks import FloatArray, IntArray
+from pushplan.world.checks import FloatArray
 
 
 @dataclass(frozen=True)
@@ -46,33 +45,3 @@ class Momentum:
             keeps = np.concatenate([[False], movables.wheeled])
         keeps[0] = False
         return cls(keeps.astype(np.float64), inertia, drag)
-
-    def select(self, active: IntArray) -> Momentum | None:
-        """For the robot and some of the objects; None if none of them keeps anything."""
-        rows = np.concatenate([[0], active + 1])
-        if not self.keeps[rows].any():
-            return None
-        return Momentum(self.keeps[rows], self.inertia[rows], self.drag[rows])
-
-    def after(self, velocities: FloatArray, h: float) -> FloatArray:
-        """Velocities (N, 3) after ``h`` [s] without contact; exact for the law above."""
-        velocities = np.ascontiguousarray(velocities)
-        return core.slow_down(velocities, self.keeps, self.drag, h)
-
-    def fastest_decay(self, velocities: FloatArray) -> float:
-        """Greatest rate [1/s] at which a body that moves by itself loses speed."""
-        moving = (self.keeps > 0.0) & velocities.any(axis=1)
-        if not moving.any():
-            return 0.0
-        speeds = np.hypot(velocities[moving, 0], velocities[moving, 1])
-        turning = np.abs(velocities[moving, 2])
-        drag = self.drag[moving]
-        rates = np.maximum(drag[:, 0] + drag[:, 1] * speeds, drag[:, 2] + drag[:, 3] * turning)
-        return float(rates.max())
-
-    def forces(self, velocities: FloatArray, h: float) -> FloatArray:
-        """(N, 3) forces [N, N, N m] that bring bodies at rest to velocities within ``h`` [s]."""
-        out = np.empty_like(velocities)
-        out[:, :2] = velocities[:, :2] * (self.inertia[:, :1] / h)
-        out[:, 2] = velocities[:, 2] * (self.inertia[:, 1] / h)
-        return out

@@ -305,7 +305,7 @@ def drag_damping(velocities: FloatArray, drag: FloatArray) -> FloatArray:
 
 def planar_rows(bodies: FloatArray) -> FloatArray:
     """(..., 3) planar poses of free bodies (..., 7): x, y, z [m] and a quaternion w, x, y, z."""
-    w, x, y, z = np.moveaxis(bodies[..., 3:], -1, 0)
+    w, x, y, z = (bodies[..., i] for i in range(3, 7))
     sines = 2.0 * (w * z + x * y)
     cosines = 1.0 - 2.0 * (y * y + z * z)
     rows = np.empty((*bodies.shape[:-1], 3))

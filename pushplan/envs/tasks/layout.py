@@ -324,7 +324,7 @@ def goal_distances(field: GeodesicField, poses: FloatArray) -> FloatArray:
         field: of the goal.
         poses: (K, 3) of the objects.
     """
-    return np.array([field.sample(x, y) for x, y in poses[:, :2].tolist()])
+    return field.sample_each(poses[:, :2])
 
 
 def footprint_at(robot: RobotModel, pose: FloatArray) -> list[Any]:

@@ -34,6 +34,10 @@ class Reach {
   /// Number of objects.
   Index count() const { return shapes_.objects.count(); }
 
+  /// Circumscribed radii of the robot and of the objects (K,) [m].
+  double robot_radius() const { return size_; }
+  std::span<const double> radii() const { return shapes_.radii; }
+
   /// Marks the objects in reach of the robot, those in motion, and those in reach of either.
   void within(const Pose& robot,
               double reach,  // greatest distance that one of its points moves in the step [m]
