@@ -17,6 +17,6 @@ from pushplan._core import (
 )
 
 
-SOURCES: str
+SOURCES: str = 'a9b5e1620a36'
 
-COMPILER: str
+COMPILER: str = 'GNU 12.2.0'

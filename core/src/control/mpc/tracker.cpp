@@ -149,22 +149,35 @@ void TrackingAssembly::assemble(const ReferencePath& track, const Tuning& tuning
   }
 }
 
-Tracker::Tracker(const Horizon& horizon, const Tuning& tuning, double span, double delay)
-    : horizon_(horizon),
+Tracker::Tracker(const CommandLimits& limits, const Tuning& tuning, const SolverSettings& solver,
+                 Index steps, double span, double delay, const Twist& before)
+    : horizon_(limits, tuning.optimise_speed ? std::vector<Index>{1, 0} : std::vector<Index>{1},
+               steps, steps, solver, before),
       tuning_(tuning),
       span_(span),
       delay_(delay),
-      assembly_(static_cast<Index>(horizon.program.x.size())) {}
+      assembly_(static_cast<Index>(horizon_.program.x.size())) {}
 
 void Tracker::begin_track() {
   place_ = 0.0;
-  horizon_.counts->known = 0;
+  horizon_.known = false;
 }
 
-std::optional<Twist> Tracker::begin_step(const ReferencePath& track, const Pose& pose, double time,
-                                         double held) {
+Twist Tracker::follow(const ReferencePath& track, const Pose& pose, double time, double held) {
+  Twist command;
+  if (is_finite(pose)) {
+    command = command_for(track, pose, time, held);
+  } else {
+    horizon_.known = false;
+    command = horizon_.send({0.0, 0.0}, held, true);
+  }
+  if (delay_ > 0.0) horizon_.remember(time, time - delay_);  // as long as it has no effect yet
+  return command;
+}
+
+Twist Tracker::command_for(const ReferencePath& track, const Pose& pose, double time, double held) {
   horizon_.lay_steps(span_, held);
-  if (horizon_.counts->known == 1) shift(held);
+  if (horizon_.known) shift(held);
   predict(pose, time);
   const double low = std::max(place_ - kBack * tuning_.size, 0.0);
   const double high = place_ + kWindow * tuning_.size;
@@ -172,50 +185,28 @@ std::optional<Twist> Tracker::begin_step(const ReferencePath& track, const Pose&
   place_ = std::min(place.along, track.length());
   const double error = errors(track, pose_, place).error;
   if (tuning_.stops && place.along >= track.length() - 1e-9) {
-    horizon_.counts->known = 0;
-    const Twist command = horizon_.send({0.0, 0.0}, held, true);
-    remember(time);
-    return command;
+    horizon_.known = false;
+    return horizon_.send({0.0, 0.0}, held, true);
   }
   if (std::abs(error) > turn_from()) {
     // too far from the path's heading for a linear model: turn towards it first
-    horizon_.counts->known = 0;
+    horizon_.known = false;
     const double turn = std::copysign(tuning_.max_turn_rate, -error);
-    const Twist command = horizon_.send({turning_speed(), turn}, held, true);
-    remember(time);
-    return command;
+    return horizon_.send({turning_speed(), turn}, held, true);
   }
   horizon_.set_bounds(horizon_.steps[0], horizon_.steps[1]);
-  const QuadraticProgram& program = horizon_.program;
+  QuadraticProgram& program = horizon_.program;
   // a plan is driven forwards
   for (std::size_t i = horizon_.steps.size(); i < program.x.size(); ++i) program.low[i] = 0.0;
-  if (horizon_.counts->known == 0) std::ranges::fill(horizon_.nominal, Twist{kNaN, kNaN});
-  assemble_step(track);
-  return std::nullopt;
-}
-
-void Tracker::assemble_step(const ReferencePath& track) {
-  assembly_.assemble(track, tuning_, pose_, place_, *horizon_.last, horizon_.steps,
-                     horizon_.nominal, horizon_.program.hessian, horizon_.program.gradient);
-}
-
-Twist Tracker::finish_step(const ReferencePath& track, const Pose& pose, double time, double held,
-                           bool solved) {
-  Twist command;
-  if (solved) {
-    horizon_.keep_solution();
-    horizon_.counts->missed = 0;
-    command = horizon_.send(horizon_.solution[0], held, false);
-  } else {
-    command = fall_back(track, pose, held);
-  }
-  remember(time);
-  return command;
-}
-
-/// Keeps what was sent for as long as it has no effect yet.
-void Tracker::remember(double time) {
-  if (delay_ > 0.0) horizon_.remember(time, time - delay_);
+  if (!horizon_.known) std::ranges::fill(horizon_.nominal, Twist{kNaN, kNaN});
+  const bool solved = horizon_.solve([&] {
+    assembly_.assemble(track, tuning_, pose_, place_, horizon_.last, horizon_.steps,
+                       horizon_.nominal, program.hessian(), program.gradient);
+  });
+  if (!solved) return fall_back(track, pose, held);
+  horizon_.keep_solution();
+  horizon_.missed = 0;
+  return horizon_.send(horizon_.solution[0], held, false);
 }
 
 /// The heading error from which the robot turns towards the path first [rad].
@@ -257,13 +248,12 @@ void Tracker::predict(const Pose& pose, double time) {
 
 /// Drives the last solution, moved on; pure pursuit where it has run out.
 Twist Tracker::fall_back(const ReferencePath& track, const Pose& pose, double held) {
-  HorizonCounts& counts = *horizon_.counts;
   const Twist ahead = horizon_.solution[0];
-  ++counts.failed;
-  ++counts.missed;
-  const bool known = counts.known == 1 && std::isfinite(ahead.v) && std::isfinite(ahead.w);
-  if (known && counts.missed < horizon_.count()) return horizon_.send(ahead, held, true);
-  counts.known = 0;
+  ++horizon_.failed;
+  ++horizon_.missed;
+  const bool known = horizon_.known && std::isfinite(ahead.v) && std::isfinite(ahead.w);
+  if (known && horizon_.missed < horizon_.count()) return horizon_.send(ahead, held, true);
+  horizon_.known = false;
   return horizon_.send(pursue(track, pose), held, true);
 }
 
