@@ -73,21 +73,16 @@ class Tracker {
   void begin_track();
 
   /// The command for where the robot is: of the solution, or what is nearest to it without one. A
-  /// pose that is not finite gives a stop, or the least speed.
+  /// pose that is not finite, or an empty path, gives a stop, or the least speed.
   Twist follow(const ReferencePath& track, const Pose& pose,
                double time,   // of the pose [s]
                double held);  // from the last call to this one [s]
-
-  /// Speed and turn rate on the arc to a point R ahead (Coulter, CMU-RI-TR-92-01).
-  Twist pursue(const ReferencePath& track, const Pose& pose) const;
 
   /// The commands ahead, and how often the solver has failed.
   Horizon& horizon() { return horizon_; }
 
  private:
   Twist command_for(const ReferencePath& track, const Pose& pose, double time, double held);
-  double turn_from() const;
-  double turning_speed() const;
   void shift(double held);
   void predict(const Pose& pose, double time);
   Twist fall_back(const ReferencePath& track, const Pose& pose, double held);
