@@ -57,7 +57,7 @@ def is_stale() -> bool:
     files = {
         path.relative_to(top).as_posix(): path
         for room in ("include", "src", "bindings")
-        for path in (top / "core" / room).rglob("*.[ch]pp")
+        for path in (top / "core" / room).rglob("*.[ch]*")
     }
     if not files:  # an installed package comes without them
         return False

@@ -20,7 +20,7 @@ from scikit_build_core import build as _build
 
 _COMPILERS = ("c++", "g++", "clang++")
 _TARGET = f"{platform.machine()}-linux-gnu.2.28"  # the oldest C library of the dependencies' wheels
-_TOOLS = {"CXX": "c++", "AR": "ar", "RANLIB": "ranlib"}
+_TOOLS = {"CC": "cc", "CXX": "c++", "AR": "ar", "RANLIB": "ranlib"}
 
 
 def _needs_zig() -> bool:
@@ -45,7 +45,7 @@ def _use_zig() -> None:
     folder = Path(tempfile.mkdtemp(prefix="pushplan-zig-"))
     for variable, tool in _TOOLS.items():
         script = folder / tool
-        options = f" -target {_TARGET}" if tool == "c++" else ""
+        options = f" -target {_TARGET}" if tool in ("cc", "c++") else ""
         script.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m ziglang {tool}{options} "$@"\n')
         script.chmod(script.stat().st_mode | stat.S_IXUSR)
         os.environ[variable] = str(script)
