@@ -258,18 +258,16 @@ void bind_tracker(nb::module_& module) {
             return std::pair{twist.v, twist.w};
           },
           "time"_a, "held"_a)
-      .def_prop_ro("failures", [](const PushTracker& self) { return self.horizon().failed; })
+      .def_prop_ro("failures", [](PushTracker& self) { return self.horizon().failed; })
       .def_prop_ro(
           "solution",
-          [](const PushTracker& self) {
+          [](PushTracker& self) {
             return copied_rows<double>(std::span<const Twist>(self.horizon().solution));
           },
           kOwned)
       .def_prop_ro(
           "steps",
-          [](const PushTracker& self) {
-            return copied(std::span<const double>(self.horizon().steps));
-          },
+          [](PushTracker& self) { return copied(std::span<const double>(self.horizon().steps)); },
           kOwned)
       .def_prop_ro("face", &PushTracker::face)
       .def_prop_ro("along", &PushTracker::along)

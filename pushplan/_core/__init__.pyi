@@ -17,6 +17,6 @@ from pushplan._core import (
 )
 
 
-SOURCES: str = 'a9b5e1620a36'
+SOURCES: str
 
-COMPILER: str = 'GNU 12.2.0'
+COMPILER: str

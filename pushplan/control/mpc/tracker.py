@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from pushplan.control.limits import driven_twist
-from pushplan.control.mpc.horizon import limits_of, settings_of, track_of
+from pushplan.control.mpc.inputs import limits_of, track_of
 from pushplan.control.mpc.mpc_config import MpcConfig
 from pushplan.control.staged_controller import StagedController
 from pushplan.core import control as core
@@ -78,7 +78,12 @@ class MpcTracker(StagedController):
         self._tracker = core.Tracker(
             limits_of(robot),
             _tuning(robot, config),
-            settings_of(config),
+            core.SolverSettings(
+                config.tolerance,
+                config.solver_iterations,
+                config.iterations,
+                config.first_iterations,
+            ),
             steps=config.horizon,
             span=config.reach * robot.circumscribed_radius / robot.max_speed,
             delay=config.delay,

@@ -106,7 +106,8 @@ def versions(simulator: str) -> dict[str, str]:
 
     Returns:
         ``python``, ``pushplan``, ``code`` (a hash of the package without `UNSEEN`), ``core`` (a
-        hash of the sources of the compiled core, its compiler and OSQP in it) and installed packages by name.
+        hash of the sources of the compiled core, its compiler, and the OSQP in it) and installed
+        packages by name.
     """
     others = {"torch", *_ENGINES} - {simulator}
     return {

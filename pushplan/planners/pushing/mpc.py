@@ -9,7 +9,8 @@ import numpy as np
 
 from pushplan.control.episode_clock import EpisodeClock
 from pushplan.control.limits import driven_twist
-from pushplan.control.mpc.horizon import limits_of, settings_of, track_of
+from pushplan.control.mpc.inputs import limits_of, track_of
+from pushplan.core import control
 from pushplan.core import pushing as core
 from pushplan.geometry.obstacles import obstacles_of
 from pushplan.planners.pushing.bumper import faces_of
@@ -143,7 +144,12 @@ class PushingMpc:
                     curvature=-1.0,
                     **weights,
                 ),
-                settings_of(config),
+                control.SolverSettings(
+                    config.tolerance,
+                    config.solver_iterations,
+                    config.iterations,
+                    config.first_iterations,
+                ),
                 groups_of(config.horizon, config.moves),
                 config.reach,
                 config.delay,

@@ -67,7 +67,7 @@ class PushTracker {
   /// The state predicted for when a command of now takes effect.
   const PushState& state_in_effect() const { return guess_; }
   /// The commands ahead, and how often the solver has failed.
-  const mpc::Horizon& horizon() const { return horizon_; }
+  mpc::Horizon& horizon() { return horizon_; }
 
  private:
   const BoxContact& contact() const { return faces_[face_].contact; }
