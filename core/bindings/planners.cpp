@@ -296,12 +296,6 @@ void bind_ships(nb::module_& module) {
           ReleaseGil())
       .def("fill_table", &IceCostToGo::fill_table, ReleaseGil())
       .def(
-          "mass_ahead",
-          [](const IceCostToGo& self, double x, double y, double theta) {
-            return self.mass_ahead({x, y, theta});
-          },
-          "x"_a, "y"_a, "theta"_a)
-      .def(
           "cost_to_go",
           [](const IceCostToGo& self, double x, double y, double theta) {
             return self.cost_to_go({x, y, theta});

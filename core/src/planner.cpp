@@ -1,450 +1,368 @@
 #include "pushplan/planner.hpp"
 
-#include <algorithm>
+#include <array>
 #include <cmath>
 #include <exception>
-#include <numbers>
 #include <optional>
 #include <random>
+#include <tuple>
 #include <utility>
 
-#include "pushplan/geometry/polygon.hpp"
-#include "pushplan/motion/random_tree/steering.hpp"
+#include "planner_scene.hpp"
 #include "pushplan/motion/shortcutting.hpp"
 #include "pushplan/motion/speed_profile.hpp"
 #include "pushplan/planners/push_aware/best_first.hpp"
 #include "pushplan/planners/push_aware/random_tree.hpp"
-#include "scene.hpp"
 
 namespace pushplan {
 namespace {
 
-// The same numbers as in the planners of the Python package, which has the reasons. R is the
-// circumscribed radius of the robot.
+// Many of these are those of the planners in Python, which say why. R: the robot's size.
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kInset = 0.05;          // depth in the goal at which a plan ends [R]
 constexpr double kSpacing = 0.15;        // distance between the poses of a path [R]
 constexpr double kLeastSpacing = 0.02;   // the same where the margin is thin [R]
-constexpr double kThinMargin = 0.05;     // [R]
-constexpr double kTightest = 0.1;        // least turning radius that plans ever use [R]
-constexpr double kEdge = 1.6;            // longest edge of a tree [R]
-constexpr double kBeyond = 1e4;          // times the way around the workspace, for a jam
-constexpr double kNearCoarsePath = 0.8;  // of the targets, at first
-constexpr double kTargetSpread = 0.5;    // standard deviation of those about it [R]
-constexpr double kHeadingSpread = 0.4;   // [rad]
-constexpr Index kAvoidIterations = 200;  // of the tree that takes objects as obstacles
-constexpr Index kTreeIterations = 1500;  // of the tree that may push them
-constexpr Index kShortcuts = 400;        // tried on a path before its gain is looked at
-constexpr double kLeastGain = 0.001;     // of the cost over so many, for more of them
-constexpr double kHopefulGains = 5.0;    // rounds with the last gain to become the best path
+constexpr double kTightest = 0.1;        // least turning radius that plans use [R]
+constexpr double kBeyond = 1e4;          // times the way around the workspace: no path is as long
+constexpr double kDetour = 2.0;          // length of a first path, in lengths to go
+constexpr double kLongestArc = 2.0;      // of random trees [R]
+constexpr double kNearPath = 0.8;        // of the targets of trees lie near the coarse path
+constexpr double kSpread = 0.5;          // standard deviation of those about it [R]
+constexpr double kTurnSpread = 0.4;      // [rad]
+constexpr double kLeastGain = 0.001;     // of a path's cost over a round of shortcuts
+constexpr double kHopefulGains = 5.0;    // such gains in which a path may become the best
+constexpr Index kShortcuts = 400;        // a round
 constexpr Index kNodes = 100'000;        // of one search at most
-constexpr Index kRandomNodes = 20'000;   // of a random tree at most; then another is begun
-constexpr double kMemory = 48.0;         // of the objects' poses in one search at most [MiB]
-constexpr double kArc = 2.0;             // length of an edge of the search [cells of the table]
+constexpr Index kTreeNodes = 5'000;      // of a random tree; then another is begun
+constexpr double kMemory = 48.0;         // of the objects' poses in a search at most [MiB]
+constexpr Index kPatience = 1'000;       // arcs that the first search drives
+constexpr double kEdge = 2.0;            // of a search [cells of the table]
 constexpr double kInflation = 1.05;      // of the length to go
-constexpr double kUnsolvedInflation = 1.3;
-constexpr double kPruning = 0.92;         // on that length, where a path is given up
-constexpr double kSlack = 0.05;           // cost above the best that shortcuts may make up for
-constexpr double kMassSpread = 0.7;       // from search to search, of the logarithm
-constexpr double kRandomFraction = 0.03;  // of the iterations, for a random tree
-constexpr Index kPatience = 1'000;        // arcs driven in one search at first
-constexpr double kPatienceGrowth = 1.25;
-constexpr Index kMostPoses = 1'000'000;  // of a path
+constexpr double kPruning = 0.92;        // on that length, where a node is given up
+constexpr double kSlack = 1.05;          // cost of a path of the search over that of the best
+constexpr double kMassSpread = 0.7;      // of masses from search to search: of their logarithm
+constexpr double kRandomFraction = 0.1;  // of the iterations of the push-aware search
+constexpr double kMostPoses = 1e6;       // of a path
 
-/// A path that owns its memory, and what it costs.
-struct Candidate {
+/// A path that owns its memory.
+struct OwnPath {
+  OwnPath(std::size_t capacity, std::size_t objects_count)
+      : poses(capacity),
+        curvatures(capacity),
+        objects(capacity * objects_count),
+        lengths(capacity),
+        works(capacity),
+        shape{static_cast<Index>(capacity), static_cast<Index>(objects_count)} {}
+
+  SweptPath view() { return {poses, curvatures, {objects.data(), shape}, lengths, works}; }
+
   std::vector<Pose> poses;
   std::vector<double> curvatures;
-  std::vector<Pose> objects;  // (M, K)
+  std::vector<Pose> objects;
   std::vector<double> lengths;
   std::vector<double> works;
-  Index object_count = 0;  // K
-  Index count = 0;         // poses in use
-  double cost = kInfinity;
-
-  void resize(Index poses_count, Index k) {
-    const auto m = static_cast<std::size_t>(poses_count);
-    poses.resize(m);
-    curvatures.assign(m, 0.0);
-    objects.resize(m * static_cast<std::size_t>(k));
-    lengths.assign(m, 0.0);
-    works.assign(m, 0.0);
-    object_count = k;
-  }
-  SweptPath view() {
-    const auto m = static_cast<Index>(poses.size());
-    return {poses, curvatures, {objects.data(), {m, object_count}}, lengths, works};
-  }
+  ArrayView<Pose, 2>::Shape shape;
 };
 
 class PlanningCall {
  public:
   PlanningCall(const World& world, const PlannerOptions& options)
-      : world_(world),
-        options_(options),
+      : options_(options),
         scene_(world),
-        model_(scene_.bodies(), scene_.settings(options.friction, options.static_friction)),
-        random_(options.seed),
-        size_(scene_.size) {}
+        robot_(world.robot),
+        start_(world.robot_pose),
+        size_(scene_.size),
+        model_(scene_.bodies(), scene_.settings(options)),
+        batch_(std::max<std::size_t>(1, 100 / (10 + scene_.poses.size()))),
+        random_(options.seed) {}
 
   Plan run();
 
  private:
-  bool stopped();
+  bool stopped() {
+    stopped_ = stopped_ || iterations_ >= options_.iterations || (options_.stop && options_.stop());
+    return stopped_;
+  }
   double uniform() { return static_cast<double>(random_() >> 11) * 0x1p-53; }
   double normal() {  // Box and Muller (1958): the same from every standard library
     const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform()));
     return radius * std::cos(2.0 * std::numbers::pi * uniform());
   }
-  Index batch() const { return std::max(Index{1}, 100 / (10 + scene_.count())); }
+  bool solved() const { return best_cost_ < kInfinity; }
 
   bool set_margin(double margin);
-  void relax();
-  PathProblem problem() const;
-  bool solved() const { return best_.cost < kInfinity; }
+  void set_radius(double radius) { problem_.turning_radius = std::max(radius, kTightest * size_); }
+  void find_coarse_path(const CostToGo& table);
+  GrowthDraw draw_growth(double bound);
+  void grow_trees(Index upto);
+  void search_table(const CostToGo& table);
+  void try_arcs(const std::vector<Arc>& arcs);
+  void shortcut_path(OwnPath& path, PricedPath priced);
+  void keep(const OwnPath& path, const PricedPath& priced);
+  Plan finish() const;
 
-  void make_table(bool whole);
-  void find_coarse_path();
-  Pose next_target();
-  std::vector<Arc> grow_tree(const ConvexObstacles& among, Index budget);
-  void grow_two();
-  void search_table();
-  void grow_at_random(Index arcs);
-  void try_arcs(const std::vector<Arc>& arcs, double limit);
-  void shortcut_candidate(Candidate& candidate);
-  void keep(Candidate& candidate);
-  Plan finish();
-
-  const World& world_;
   const PlannerOptions& options_;
   Scene scene_;
-  QuasiStatic model_;
-  std::mt19937_64 random_;
+  const Robot& robot_;
+  Pose start_;
   double size_;
+  QuasiStatic model_;
+  std::size_t batch_;  // shortcuts between two looks at the stop rule
+  std::mt19937_64 random_;
   Index iterations_ = 0;
   bool stopped_ = false;
-  double radius_ = 0.0;
-  double margin_ = 0.0;
-  double spacing_ = 0.0;
-  double near_fraction_ = kNearCoarsePath;
-  int relaxed_ = 0;
-  std::optional<CostToGoMaker> table_;
+  Outlines footprint_;
+  PathProblem problem_{};
+  std::vector<Pose> coarse_path_;
+  double to_go_ = kInfinity;  // length to the goal without objects [m]
+  double detour_ = kDetour;
   std::optional<PushTree> search_tree_;
   std::optional<PushTree> random_tree_;
   double patience_ = static_cast<double>(kPatience);
-  std::vector<Pose> coarse_path_;
-  Candidate best_;
+  std::optional<OwnPath> best_;
+  Index best_count_ = 0;
+  double best_cost_ = kInfinity;
 };
 
-bool PlanningCall::stopped() {
-  stopped_ = stopped_ || iterations_ >= options_.iterations || (options_.stop && options_.stop());
-  return stopped_;
-}
-
-/// Keeps a margin [m] from walls. False if the robot is nearer to one.
+/// Keeps a margin from walls [R]. False if the robot is nearer to one.
 bool PlanningCall::set_margin(double margin) {
-  margin_ = margin;
-  scene_.grow_footprint(margin);
-  spacing_ = kSpacing * size_;
-  if (margin < kThinMargin * size_) {
-    spacing_ = std::min(spacing_, std::max(2.0 * margin, kLeastSpacing * size_));
-  }
-  return CollisionChecker(scene_.grown_footprint(), scene_.walls()).is_free(world_.robot_pose);
-}
-
-/// Allows tighter turns from the second time on, and less margin from the fourth.
-void PlanningCall::relax() {
-  near_fraction_ *= 0.5;
-  if (++relaxed_ < 2) return;
-  if (relaxed_ >= 4) set_margin(0.4 * margin_);
-  const Robot& robot = world_.robot;
-  radius_ = robot.drive == Drive::kDifferential ? 0.5 * radius_ : scene_.turning_radius();
-  radius_ = std::max(radius_, kTightest * size_);
-}
-
-PathProblem PlanningCall::problem() const {
-  const double mass = world_.robot.mass;
-  const Box& bounds = world_.bounds;
-  const double around = bounds.x_max - bounds.x_min + bounds.y_max - bounds.y_min + size_;
-  const double load = options_.push_weight * scene_.total_mass() / mass;
-  return {mass,
-          options_.push_weight,
-          radius_,
-          spacing_,
-          kBeyond * around * (1.0 + load),
-          1.5 * size_,
-          scene_.goal(kInset * size_),
-          scene_.grown_footprint(),
-          scene_.walls()};
+  footprint_ = scene_.footprint(margin * size_);
+  problem_.footprint = {footprint_.polygons(), footprint_.radius()};
+  problem_.spacing = std::min(kSpacing, std::max(2.0 * margin, kLeastSpacing)) * size_;
+  return CollisionChecker(problem_.footprint, problem_.walls).is_free(start_);
 }
 
 Plan PlanningCall::run() {
-  radius_ = world_.robot.drive == Drive::kDifferential
-                ? size_
-                : std::max(scene_.turning_radius() / options_.turn_fraction, kTightest * size_);
-  const std::array<double, 5> fractions{1.0, 0.5, 0.25, 0.1, 0.0};  // of the margin
-  if (std::ranges::none_of(
-          fractions, [&](double part) { return set_margin(part * options_.margin * size_); })) {
-    return {PlanStatus::kStartBlocked, "the robot overlaps a wall or is out of the bounds"};
+  const Box& bounds = scene_.world.bounds;
+  const double around = bounds.x_max - bounds.x_min + bounds.y_max - bounds.y_min + size_;
+  double load = 1.0;
+  for (const double mass : scene_.masses) load += options_.push_weight * mass / robot_.mass;
+  problem_.robot_mass = robot_.mass;
+  problem_.push_weight = options_.push_weight;
+  problem_.jam_length = kBeyond * around * load;
+  problem_.displacement = 1.5 * size_;
+  problem_.goal = scene_.goal(kInset * size_);
+  problem_.walls = scene_.obstacles();
+  set_radius(robot_.drive == Drive::kDifferential ? size_
+                                                  : scene_.turning_radius / options_.turn_fraction);
+  constexpr std::array<double, 5> kParts{1.0, 0.5, 0.25, 0.1, 0.0};  // of the margin
+  if (std::ranges::none_of(kParts, [&](double p) { return set_margin(p * options_.margin); })) {
+    return {PlanStatus::kStartBlocked, "the robot overlaps a wall, or is out of the bounds"};
   }
-  if (world_.goal.contains({world_.robot_pose.x, world_.robot_pose.y})) {
-    try_arcs({}, kInfinity);
+  if (scene_.world.goal.contains({start_.x, start_.y})) {
+    try_arcs({});
     return finish();
   }
   const bool push_aware = options_.search == SearchKind::kPushAware;
-  make_table(push_aware);
-  find_coarse_path();
-  while (!stopped()) {
+  const Footprint bare{scene_.robot.polygons(), size_};
+  CostToGoMaker maker(bare, problem_.walls, problem_.goal, size_, problem_.turning_radius,
+                      push_aware ? CostToGoMaker::kHeadings : 8);
+  while (!maker.done() && (push_aware || !maker.flooded()) && !stopped()) maker.step();
+  const CostToGo table = maker.table();
+  if (maker.useful() && maker.flooded()) find_coarse_path(table);
+  to_go_ = table.length_to_go(start_);
+  if (!(to_go_ < kInfinity)) to_go_ = around;
+  for (int round = 0; !stopped(); ++round) {
     const Index begun = iterations_;
-    if (push_aware) search_table();
-    grow_two();
-    if (push_aware) {
-      grow_at_random(
-          static_cast<Index>(kRandomFraction * static_cast<double>(iterations_ - begun)));
-    }
-    if (!solved()) relax();
+    if (push_aware && maker.useful() && maker.done()) search_table(table);
+    const auto searched = static_cast<double>(iterations_ - begun);
+    grow_trees(solved() && push_aware ? static_cast<Index>(kRandomFraction * searched)
+                                      : kTreeNodes);
+    if (solved() || round < 1) continue;
+    detour_ *= 1.5;  // the way may be longer, or begin with a tight turn
+    set_radius(robot_.drive == Drive::kDifferential ? 0.5 * problem_.turning_radius
+                                                    : scene_.turning_radius);
   }
   return finish();
 }
 
-/// Makes the table of lengths to the goal without objects, or its floor alone.
-void PlanningCall::make_table(bool whole) {
-  const Index headings = whole ? CostToGoMaker::kHeadings : 8;
-  table_.emplace(scene_.footprint(), scene_.walls(), scene_.goal(kInset * size_), size_, radius_,
-                 headings);
-  while (!table_->done() && (whole || !table_->flooded()) && !stopped()) table_->step();
-}
-
 /// Follows the floor of the table downhill.
-void PlanningCall::find_coarse_path() {
-  if (!table_->useful() || !table_->flooded()) return;
-  const CostToGo table = table_->table();
-  Index row = table.row_of(world_.robot_pose.y);
-  Index column = table.column_of(world_.robot_pose.x);
+void PlanningCall::find_coarse_path(const CostToGo& table) {
+  Index row = table.row_of(start_.y);
+  Index column = table.column_of(start_.x);
   while (table.floor(row, column) > 0.0) {
     const Vec2 from = table.cells.centre(row, column);
-    double least = table.floor(row, column);
-    std::pair<Index, Index> next{row, column};
+    std::tuple least{table.floor(row, column), row, column};
     for (Index r = std::max(row - 1, Index{0}); r <= std::min(row + 1, table.rows() - 1); ++r) {
-      for (Index c = std::max(column - 1, Index{0}); c <= std::min(column + 1, table.columns() - 1);
-           ++c) {
-        if (table.floor(r, c) >= least) continue;
-        least = table.floor(r, c);
-        next = {r, c};
+      const Index last = std::min(column + 1, table.columns() - 1);
+      for (Index c = std::max(column - 1, Index{0}); c <= last; ++c) {
+        least = std::min(least, std::tuple{table.floor(r, c), r, c});
       }
     }
-    if (next == std::pair(row, column)) return;
-    std::tie(row, column) = next;
+    if (least >= std::tuple{table.floor(row, column), row, column}) return;
+    std::tie(std::ignore, row, column) = least;
     const Vec2 to = table.cells.centre(row, column);
     coarse_path_.push_back({to.x, to.y, std::atan2(to.y - from.y, to.x - from.x)});
   }
 }
 
-/// A pose that a tree grows towards: mostly near the coarse path, sometimes anywhere.
-Pose PlanningCall::next_target() {
-  const Box& bounds = world_.bounds;
-  if (uniform() < near_fraction_) {
-    Pose at{world_.goal.point.x, world_.goal.point.y, 2.0 * std::numbers::pi * uniform()};
-    if (!coarse_path_.empty()) {
-      const auto count = static_cast<double>(coarse_path_.size());
-      at = coarse_path_[static_cast<std::size_t>(count * uniform())];
-    }
-    const double spread = kTargetSpread * size_;
-    return {at.x + spread * normal(), at.y + spread * normal(),
-            at.theta + kHeadingSpread * normal()};
+/// A random arc: mostly towards a place near the coarse path, sometimes anywhere.
+GrowthDraw PlanningCall::draw_growth(double bound) {
+  GrowthDraw draw{uniform(), uniform(), uniform(), uniform(), uniform(), uniform()};
+  if (coarse_path_.empty() || uniform() >= kNearPath) return draw;
+  const double part = uniform();
+  const auto i = static_cast<std::size_t>(part * static_cast<double>(coarse_path_.size()));
+  const Pose& at = coarse_path_[i];
+  const Box& box = scene_.world.bounds;
+  const double heading = at.theta + kTurnSpread * normal();
+  draw.x = (at.x + kSpread * size_ * normal() - box.x_min) / (box.x_max - box.x_min);
+  draw.y = (at.y + kSpread * size_ * normal() - box.y_min) / (box.y_max - box.y_min);
+  draw.heading = floor_mod(heading / (2.0 * std::numbers::pi), 1.0);
+  draw.cost = std::min(part * robot_.mass * to_go_ / bound, 1.0);
+  return draw;
+}
+
+/// Adds arcs to a random tree that carries the objects along, and tries what gets to the goal.
+void PlanningCall::grow_trees(Index arcs) {
+  if (!random_tree_) {
+    random_tree_.emplace(kTreeNodes, scene_.poses.size(), kMemory, PushTree::CellShape{});
+    random_tree_->plant(start_, scene_.poses, 0.0);
   }
-  return {bounds.x_min + uniform() * (bounds.x_max - bounds.x_min),
-          bounds.y_min + uniform() * (bounds.y_max - bounds.y_min),
-          2.0 * std::numbers::pi * uniform()};
-}
-
-/// The arcs of a random tree to the goal (LaValle and Kuffner 2001); none if it does not get there.
-std::vector<Arc> PlanningCall::grow_tree(const ConvexObstacles& among, Index budget) {
-  const PathProblem problem = this->problem();
-  if (!CollisionChecker(problem.footprint, among).is_free(world_.robot_pose)) return {};
-  const double turn_weight = 0.5 * size_;
-  Steering steering({1.0 / radius_, kEdge * size_, spacing_, turn_weight}, problem.footprint,
-                    among);
-  struct Node {
-    Pose pose;
-    Arc arc;  // that leads to it
-    std::size_t before;
-  };
-  std::vector<Node> tree{{world_.robot_pose, {0.0, 0.0}, 0}};
-  for (Index i = 0; i < budget && !(i % 50 == 0 && stopped()); ++i, ++iterations_) {
-    const Pose target = next_target();
-    const auto distance = [&](const Node& node) {
-      return std::hypot(node.pose.x - target.x, node.pose.y - target.y) +
-             turn_weight * std::abs(wrap_below_pi(node.pose.theta - target.theta));
-    };
-    const auto nearest = std::ranges::min_element(tree, {}, distance);
-    const double sampled = (2.0 * uniform() - 1.0) / radius_;
-    const auto [arc, end] = steering.steer(nearest->pose, target, sampled, 0.0);
-    if (arc.length == 0.0) continue;
-    tree.push_back({end, arc, static_cast<std::size_t>(nearest - tree.begin())});
-    if (!problem.goal.contains({end.x, end.y})) continue;
-    std::vector<Arc> arcs;
-    for (std::size_t at = tree.size() - 1; at > 0; at = tree[at].before) {
-      arcs.push_back(tree[at].arc);
-    }
-    return {arcs.rbegin(), arcs.rend()};
+  const GrowthScales scales{2.0 * size_, std::numbers::pi, 2.0 * size_ * robot_.mass};
+  std::vector<GrowthDraw> draws(3 * batch_);
+  const Index last = iterations_ + arcs;
+  while (iterations_ < last && !stopped()) {
+    const double bound = std::min(best_cost_, detour_ * robot_.mass * to_go_);
+    for (GrowthDraw& draw : draws) draw = draw_growth(bound);
+    const Growth found =
+        grow(*random_tree_, draws, bound, kLongestArc * size_, scales, problem_, model_);
+    iterations_ += static_cast<Index>(draws.size());
+    if (found.status == Growth::Status::kGoing) continue;
+    if (found.node >= 0) try_arcs(random_tree_->arcs_to(found.node));
+    random_tree_->plant(start_, scene_.poses, 0.0);
   }
-  return {};
 }
 
-/// Paths of two trees, around the objects and among them.
-void PlanningCall::grow_two() {
-  if (scene_.count() > 0) try_arcs(grow_tree(scene_.everything(), kAvoidIterations), kInfinity);
-  try_arcs(grow_tree(scene_.walls(), kTreeIterations), kInfinity);
-}
-
-/// One best-first search under the best cost so far, with other edges and masses each time.
-void PlanningCall::search_table() {
-  if (!table_->useful() || !table_->done()) return;
-  const CostToGo table = table_->table();
+/// One best-first search below the best cost, with other edges and masses each time.
+void PlanningCall::search_table(const CostToGo& table) {
   const bool first = !search_tree_;
   if (first) {
     const PushTree::CellShape cells{table.rows(), table.columns(), table.headings(), 1};
-    search_tree_.emplace(kNodes, scene_.count(), kMemory, cells);
+    search_tree_.emplace(kNodes, scene_.poses.size(), kMemory, cells);
   }
   PushTree& tree = *search_tree_;
-  tree.plant(world_.robot_pose, scene_.poses, 0.0);
+  tree.plant(start_, scene_.poses, 0.0);
   const int turns = first ? 2 : 1 + static_cast<int>(3.0 * uniform());  // to each side
   std::vector<double> curvatures;
   for (int i = -turns; i <= turns; ++i) {
-    curvatures.push_back(static_cast<double>(i) / static_cast<double>(turns) / radius_);
+    curvatures.push_back(i / (turns * problem_.turning_radius));
   }
   std::vector<double> masses = scene_.masses;
-  if (!first) {
-    for (double& mass : masses) mass *= std::exp(kMassSpread * normal());
-  }
-  const double length = kArc * table.cells.step * (first ? 1.0 : 0.7 + 0.8 * uniform());
-  const double alone = world_.robot.mass * table.length_to_go(world_.robot_pose);
-  double inflation = kUnsolvedInflation;
-  if (solved()) inflation = std::min(std::max(best_.cost / alone, 1.03), 2.0);
-  if (!first) inflation = kInflation + (inflation - kInflation) * uniform();
+  for (double& mass : masses) mass *= first ? 1.0 : std::exp(kMassSpread * normal());
+  const double length = kEdge * table.cells.step * (first ? 1.0 : 0.7 + 0.8 * uniform());
+  // among many objects the rest of a path costs more than its length too
+  const double ratio = solved() ? best_cost_ / (robot_.mass * to_go_) : 1.3;
+  const double most = std::min(std::max(ratio, kInflation), 2.0);
+  const double inflation = first ? most : kInflation + (most - kInflation) * uniform();
   const Branching branching{curvatures, length, inflation, kPruning, masses};
-  const double bound = (1.0 + kSlack) * best_.cost;
-  AStar<PushLattice<QuasiStatic>> search({tree, table, branching, bound, problem(), model_},
-                                         2 * kNodes);
+  AStar<PushLattice<QuasiStatic>> search(
+      {tree, table, branching, kSlack * best_cost_, problem_, model_}, 2 * kNodes);
   search.start(1);
-  while (!stopped()) {
-    const Index before = tree.driven;
-    if (static_cast<double>(before) >= patience_) {
-      patience_ *= kPatienceGrowth;
-      return;
-    }
-    const SearchStatus status = search.run(6 * batch());
-    iterations_ += std::max(Index{1}, tree.driven - before);
-    if (status == SearchStatus::kFound) {
-      try_arcs(tree.arcs_to(search.goal() >> 1), problem().jam_length * world_.robot.mass);
-    }
-    if (status != SearchStatus::kPaused || tree.full) return;
+  SearchStatus status = SearchStatus::kPaused;
+  while (status == SearchStatus::kPaused && !tree.full && !stopped()) {
+    const auto before = static_cast<double>(tree.driven);
+    if (before >= patience_) break;
+    status = search.run(static_cast<Index>(6 * batch_));
+    iterations_ += std::max<Index>(1, tree.driven - static_cast<Index>(before));
   }
-}
-
-/// Adds arcs to a random tree over poses and costs, which finds what the search cannot represent.
-void PlanningCall::grow_at_random(Index arcs) {
-  if (!random_tree_) {
-    random_tree_.emplace(kRandomNodes, scene_.count(), kMemory, PushTree::CellShape{});
-    random_tree_->plant(world_.robot_pose, scene_.poses, 0.0);
-  }
-  const GrowthScales scales{2.0 * size_, std::numbers::pi, 2.0 * size_ * world_.robot.mass};
-  std::vector<GrowthDraw> draws(static_cast<std::size_t>(3 * batch()));
-  const Index last = iterations_ + arcs;
-  while (iterations_ < last && solved() && !stopped()) {
-    for (GrowthDraw& draw : draws) {
-      draw = {uniform(), uniform(), uniform(), uniform(), uniform(), uniform()};
-    }
-    const Growth found =
-        grow(*random_tree_, draws, best_.cost, 2.0 * size_, scales, problem(), model_);
-    iterations_ += static_cast<Index>(draws.size());
-    if (found.status == Growth::Status::kFound) {
-      try_arcs(random_tree_->arcs_to(found.node), problem().jam_length * world_.robot.mass);
-    } else if (found.status == Growth::Status::kFull) {
-      random_tree_->plant(world_.robot_pose, scene_.poses, 0.0);
-    }
-  }
+  if (status == SearchStatus::kPaused) patience_ *= 1.25;
+  if (status == SearchStatus::kFound) try_arcs(tree.arcs_to(search.goal() >> 1));
 }
 
 /// Shortcuts the path along some arcs for as long as that pays, and it may still become the best.
-void PlanningCall::try_arcs(const std::vector<Arc>& arcs, double limit) {
-  Candidate path;
+void PlanningCall::try_arcs(const std::vector<Arc>& arcs) {
   double capacity = 200.0;  // shortcuts may take more poses
   for (const Arc& arc : arcs) {
-    capacity += 3.0 * (std::abs(arc.length) / step_along(arc.curvature, spacing_) + 1.0);
+    capacity += 3.0 * (arc.length / step_along(arc.curvature, problem_.spacing) + 1.0);
   }
-  const bool in_goal = world_.goal.contains({world_.robot_pose.x, world_.robot_pose.y});
-  if ((arcs.empty() && !in_goal) || !(capacity < static_cast<double>(kMostPoses))) return;
-  const PathProblem problem = this->problem();
-  path.resize(static_cast<Index>(capacity), scene_.count());
-  path.count = lay_out(world_.robot_pose, arcs, path.view(), problem);
+  if (!(capacity < kMostPoses)) return;
+  OwnPath path(static_cast<std::size_t>(capacity), scene_.poses.size());
+  PricedPath priced{lay_out(start_, arcs, path.view(), problem_), 0.0};
   std::ranges::copy(scene_.poses, path.objects.begin());
-  path.cost = 0.0;
-  PathSweep<QuasiStatic> sweep(problem, model_);
-  for (Index first = 0; first + 1 < path.count; first += batch()) {
-    const Index upto = std::min(first + batch() + 1, path.count);
-    path.cost = sweep.cost(path.view(), first, upto, limit, std::numeric_limits<Index>::max());
-    if (!(path.cost < limit) || (upto < path.count && stopped())) return;
+  PathSweep<QuasiStatic> sweep(problem_, model_);
+  const double jam = problem_.jam_length * robot_.mass;
+  const auto step = static_cast<Index>(batch_);
+  for (Index first = 0; first + 1 < priced.count; first += step) {
+    const Index upto = std::min(first + step + 1, priced.count);
+    priced.cost = sweep.cost(path.view(), first, upto, jam, std::numeric_limits<Index>::max());
+    if (!(priced.cost < jam) || (upto < priced.count && stopped())) return;
   }
-  keep(path);
-  while (path.count > 3 && !stopped()) {
-    const double before = path.cost;
-    shortcut_candidate(path);
-    const double gain = before - path.cost;
-    const double behind = path.cost - best_.cost;
-    if (gain <= kLeastGain * before || behind > kHopefulGains * gain) return;
-  }
+  keep(path, priced);
+  shortcut_path(path, priced);
 }
 
-void PlanningCall::shortcut_candidate(Candidate& path) {
-  const PathProblem problem = this->problem();
-  Candidate trial;
-  trial.resize(static_cast<Index>(path.poses.size()), scene_.count());
-  std::vector<ShortcutDraw> draws(static_cast<std::size_t>(batch()));
-  std::vector<ShortcutShift> shifts(draws.size());
-  for (Index done = 0; done < kShortcuts && !stopped(); done += batch()) {
-    for (ShortcutDraw& draw : draws) draw = {uniform(), uniform(), uniform(), uniform()};
-    for (ShortcutShift& shift : shifts) shift = {normal(), normal()};
-    const PricedPath found = shortcut(path.view(), {path.count, path.cost}, draws, shifts,
-                                      trial.view(), problem, model_);
-    path.count = found.count;
-    path.cost = found.cost;
-    iterations_ += batch();
-    keep(path);
+void PlanningCall::shortcut_path(OwnPath& path, PricedPath priced) {
+  OwnPath trial(path.poses.size(), scene_.poses.size());
+  std::vector<ShortcutDraw> draws(batch_);
+  std::vector<ShortcutShift> shifts(batch_);
+  double gain = kInfinity;
+  while (gain > kLeastGain * priced.cost && priced.cost - best_cost_ <= kHopefulGains * gain) {
+    const double before = priced.cost;
+    for (Index done = 0; done < kShortcuts; done += static_cast<Index>(batch_)) {
+      if (stopped()) return;
+      for (ShortcutDraw& draw : draws) draw = {uniform(), uniform(), uniform(), uniform()};
+      for (ShortcutShift& shift : shifts) shift = {normal(), normal()};
+      priced = shortcut(path.view(), priced, draws, shifts, trial.view(), problem_, model_);
+      iterations_ += static_cast<Index>(batch_);
+      keep(path, priced);
+    }
+    gain = before - priced.cost;
   }
 }
 
-/// Keeps a path that is the best so far, and free of jams.
-void PlanningCall::keep(Candidate& path) {
-  if (path.cost < best_.cost && path.cost < problem().jam_length * world_.robot.mass) best_ = path;
+void PlanningCall::keep(const OwnPath& path, const PricedPath& priced) {
+  if (priced.cost >= best_cost_) return;
+  best_ = path;
+  best_count_ = priced.count;
+  best_cost_ = priced.cost;
 }
 
-Plan PlanningCall::finish() {
+Plan PlanningCall::finish() const {
   if (!solved()) return {PlanStatus::kNoPlan, "no plan was found within the budget"};
-  const auto count = static_cast<std::size_t>(best_.count);
-  Plan found{PlanStatus::kSolved};
-  found.poses.assign(best_.poses.begin(), best_.poses.begin() + best_.count);
-  found.lengths.assign(best_.lengths.begin(), best_.lengths.begin() + best_.count);
-  found.times.resize(count);
-  found.speeds.resize(count);
-  found.turn_rates.resize(count);
+  const auto count = static_cast<std::size_t>(best_count_);
+  const auto first = [](const auto& all, std::size_t n) {
+    return std::vector(all.begin(), all.begin() + static_cast<Index>(n));
+  };
+  const std::vector<double> numbers(count);
+  Plan found{PlanStatus::kSolved, {}, numbers, first(best_->poses, count)};
+  found.lengths = first(best_->lengths, count);
+  found.speeds = found.turn_rates = numbers;
+  found.objects = first(best_->objects, count * scene_.poses.size());
+  found.travel_cost = robot_.mass * found.lengths.back();
+  found.interaction_cost = best_->works[count - 1];
   std::vector<double> chords;
   for (std::size_t i = 1; i < count; ++i) chords.push_back(found.lengths[i] - found.lengths[i - 1]);
-  const Robot& robot = world_.robot;
-  fill_speed_profile(
-      {found.poses, std::span(best_.curvatures).first(count)}, chords,
-      {size_, robot.max_speed, 0.0, options_.turn_fraction * robot.max_turn_rate,
-       robot.max_acceleration, robot.max_turn_acceleration, robot.drive != Drive::kConstantSpeed,
-       world_.robot_twist.v, world_.robot_twist.w},
-      {found.times, found.speeds, found.turn_rates});
-  for (Index i = 0; i < best_.count * best_.object_count; ++i) {
-    found.objects.push_back(
-        scene_.given_pose(i % best_.object_count, best_.objects[static_cast<std::size_t>(i)]));
-  }
-  found.travel_cost = robot.mass * found.lengths.back();
-  found.interaction_cost = best_.works[count - 1];
+  const mpc::Twist& driven = scene_.world.robot_twist;
+  const SpeedLimits limits{size_,
+                           robot_.max_speed,
+                           0.0,
+                           options_.turn_fraction * robot_.max_turn_rate,
+                           robot_.max_acceleration,
+                           robot_.max_turn_acceleration,
+                           robot_.drive != Drive::kConstantSpeed,
+                           driven.v,
+                           driven.w};
+  fill_speed_profile({found.poses, std::span(best_->curvatures).first(count)}, chords, limits,
+                     {found.times, found.speeds, found.turn_rates});
   return found;
+}
+
+double size_of(const Robot& robot) {
+  double size = 0.0;
+  for (const Outline& part : robot.parts) {
+    for (const Vec2 p : part) size = std::max(size, std::hypot(p.x, p.y));
+  }
+  return size;
+}
+
+mpc::CommandLimits limits_of(const Robot& robot) {
+  return {robot.drive == Drive::kConstantSpeed,
+          0.0,
+          robot.max_speed,
+          robot.max_turn_rate,
+          robot.max_acceleration,
+          robot.max_turn_acceleration,
+          robot.turning_radius};
 }
 
 }  // namespace
@@ -459,6 +377,21 @@ Plan plan(const World& world, const PlannerOptions& options) {
   } catch (...) {
     return {PlanStatus::kFailed, "the stop rule threw something that is no std::exception"};
   }
+}
+
+PurePursuit make_pure_pursuit(const Robot& robot, const mpc::Twist& driven) {
+  return {limits_of(robot), size_of(robot), driven};
+}
+
+mpc::Tracker make_tracker(const Robot& robot, const mpc::Twist& driven, double delay) {
+  const double size = size_of(robot);
+  const mpc::Tuning tuning{size,
+                           robot.max_speed,
+                           robot.max_turn_rate,
+                           robot.max_acceleration,
+                           robot.drive != Drive::kConstantSpeed,
+                           false};
+  return {limits_of(robot), tuning, {}, 20, 3.0 * size / robot.max_speed, delay, driven};
 }
 
 }  // namespace pushplan

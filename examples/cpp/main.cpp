@@ -5,7 +5,6 @@
 #include <limits>
 #include <new>
 
-#include "pushplan/controllers.hpp"
 #include "pushplan/planner.hpp"
 
 namespace {
@@ -30,8 +29,7 @@ pushplan::World room() {
   world.robot.max_turn_acceleration = 4.0;
   world.robot_pose = {1.0, 1.0, 0.0};
   world.walls = {rectangle(3.9, 0.0, 4.1, 1.2), rectangle(3.9, 2.6, 4.1, 4.0)};
-  world.objects = {{rectangle(-0.2, -0.2, 0.2, 0.2), {4.0, 1.9, 0.3}, 3.0},
-                   {rectangle(-0.2, -0.2, 0.2, 0.2), {6.0, 2.0, 0.0}, 3.0}};
+  world.objects = {{rectangle(3.8, 1.7, 4.2, 2.1), 3.0}, {rectangle(5.8, 1.8, 6.2, 2.2), 3.0}};
   world.goal = {pushplan::GoalRegion::Kind::kDisc, {7.0, 3.0}, {}, 0.3};
   world.bounds = {0.0, 0.0, 8.0, 4.0};
   return world;
@@ -88,10 +86,9 @@ bool plan_and_follow(const char* name, pushplan::SearchKind search) {
   pushplan::mpc::Tracker tracker = pushplan::make_tracker(world.robot);
   pursuit.begin_track();
   tracker.begin_track();
-  const bool pursued =
-      follow("pure pursuit", world, plan, [&](const pushplan::Pose& pose, double) {
-        return pursuit.follow(track, pose, kPeriod);
-      });
+  const bool pursued = follow("pure pursuit", world, plan, [&](const pushplan::Pose& pose, double) {
+    return pursuit.follow(track, pose, kPeriod);
+  });
   const bool tracked =
       follow("predictive tracker", world, plan, [&](const pushplan::Pose& pose, double time) {
         return tracker.follow(track, pose, time, kPeriod);

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "pushplan/control/mpc/tracking.hpp"
-#include "pushplan/geometry/pose.hpp"
 #include "pushplan/motion/goal_region.hpp"
 
 namespace pushplan {
@@ -32,12 +31,10 @@ struct Robot {
 
 /// Something that the robot may push.
 struct Object {
-  Outline outline;  // in its body frame
-  Pose pose;
+  Outline outline;    // where it is now
   double mass = 0.0;  // [kg]
 };
 
-/// The scene now. The robot's origin has to stay within the bounds.
 struct World {
   Robot robot;
   Pose robot_pose{};
@@ -45,7 +42,7 @@ struct World {
   std::vector<Outline> walls;
   std::vector<Object> objects;
   GoalRegion goal{};  // of the robot's origin; the normal of a line has length 1
-  Box bounds{};
+  Box bounds{};       // within which the robot's origin has to stay
 };
 
 }  // namespace pushplan

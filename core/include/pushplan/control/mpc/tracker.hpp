@@ -14,7 +14,7 @@
 
 namespace pushplan::mpc {
 
-/// Limits of the robot and weights of the cost.
+/// Limits of the robot and weights of the cost, which `MpcConfig` in Python describes.
 struct Tuning {
   double size;              // R, circumscribed radius [m]
   double max_speed;         // [m/s]
@@ -22,11 +22,11 @@ struct Tuning {
   double max_acceleration;  // [m/s^2]
   bool stops;               // the robot stops at the end of the path
   bool optimise_speed;
-  double heading_weight;
-  double turn_weight;
-  double smoothness;
-  double terminal;
-  double speed_weight;
+  double heading_weight = 0.5;
+  double turn_weight = 0.02;
+  double smoothness = 0.001;
+  double terminal = 4.0;
+  double speed_weight = 0.2;
 };
 
 /// Puts up the tracking problem: P and q of min 1/2 z'Pz + q'z over
