@@ -29,7 +29,7 @@ struct PlannerOptions {
   SearchKind search = SearchKind::kPushAware;
   std::uint64_t seed = 0;        // the same one gives the same plan, without a stop rule
   Index iterations = 20'000;     // nodes and shortcuts until the call ends
-  std::function<bool()> stop;    // asked every few milliseconds: true ends the call
+  std::function<bool()> stop{};  // asked every few milliseconds: true ends the call
   double push_weight = 2.5;      // w
   double margin = 0.08;          // clearance from walls where there is room [circumscribed radii]
   double turn_fraction = 0.9;    // of the greatest turn rate; the rest is for tracking

@@ -19,8 +19,8 @@ enum class Drive {
 };
 
 struct Robot {
-  std::vector<Outline> parts;  // of the footprint, in the body frame: x forward, y left
-  double mass = 0.0;           // [kg]
+  std::vector<Outline> parts{};  // of the footprint, in the body frame: x forward, y left
+  double mass = 0.0;             // [kg]
   Drive drive = Drive::kDifferential;
   double max_speed = 0.0;       // [m/s]
   double max_turn_rate = 0.0;   // [rad/s]
@@ -31,16 +31,16 @@ struct Robot {
 
 /// Something that the robot may push.
 struct Object {
-  Outline outline;    // where it is now
+  Outline outline{};  // where it is now
   double mass = 0.0;  // [kg]
 };
 
 struct World {
-  Robot robot;
+  Robot robot{};
   Pose robot_pose{};
   mpc::Twist robot_twist{};  // that it drives now
-  std::vector<Outline> walls;
-  std::vector<Object> objects;
+  std::vector<Outline> walls{};
+  std::vector<Object> objects{};
   GoalRegion goal{};  // of the robot's origin; the normal of a line has length 1
   Box bounds{};       // within which the robot's origin has to stay
 };
