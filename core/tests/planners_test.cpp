@@ -182,6 +182,7 @@ void tables_measure_lengths() {
     const Vec2 centre = table.cells.centre(at / table.columns(), at % table.columns());
     const double straight = std::hypot(centre.x - 5.0, centre.y - 5.0);
     const double floor = table.floor.data()[at];
+    if (centre.x > 10.0 || centre.y > 10.0) continue;  // out of the bounds
     CHECK(floor >= straight - 0.1 && floor <= 1.09 * straight + 0.1);
     CHECK(table.length_to_go({centre.x, centre.y, 1.0}) >= straight - 0.2);
   }
