@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -41,6 +42,7 @@ def configure(source: Path, folder: Path, package: Path) -> None:
 
 
 def test_the_example_plans_and_follows_with_both_controllers(package, tmp_path):
+    assert run(sys.executable, "-m", "pushplan", "--cmake-dir").strip() == str(package)
     configure(EXAMPLE, tmp_path, package)
     run("cmake", "--build", tmp_path)
     told = run(tmp_path / "push_robot")  # which ends well only if all of it did
