@@ -144,16 +144,7 @@ void bind_clearance(nb::module_& module) {
             const auto [robot, box] = self.gaps(contact, normal, state_of(state), obstacles);
             return std::pair{robot, box};
           },
-          "contact"_a, "normal"_a, "state"_a.noconvert(), "obstacles"_a, ReleaseGil())
-      .def(
-          "free_fraction",
-          [](Clearance& self, const BoxContact& contact, double normal, const OneState& start,
-             double v, double w, double duration, const Obstacles& obstacles) {
-            return self.free_fraction(contact, normal, state_of(start), {v, w}, duration,
-                                      obstacles);
-          },
-          "contact"_a, "normal"_a, "start"_a.noconvert(), "v"_a, "w"_a, "duration"_a, "obstacles"_a,
-          ReleaseGil());
+          "contact"_a, "normal"_a, "state"_a.noconvert(), "obstacles"_a, ReleaseGil());
 }
 
 void bind_problem(nb::module_& module) {

@@ -166,19 +166,25 @@ void rollouts_keep_to_limits() {
   CHECK(seen[0] > 0 && seen[1] + seen[2] > 0);
 }
 
-/// Floods are never shorter than straight lines, nor longer than the detour of a grid.
-void floods_measure_lengths() {
-  const auto open = std::make_unique<bool[]>(400);
-  std::fill_n(open.get(), 400, true);
-  const Cells cells{{0.0, 0.0}, 0.5};
-  const GoalRegion goal{GoalRegion::Kind::kDisc, {5.25, 5.25}, {}, 0.1};
-  const Flood found = flood({open.get(), {20, 20}}, cells, goal, -1);
-  CHECK(found.order.size() == 400 && found.lengths[10 * 20 + 10] == 0.0);
-  for (Index at = 0; at < 400; ++at) {
-    const Vec2 centre = cells.centre(at / 20, at % 20);
-    const double straight = std::hypot(centre.x - 5.25, centre.y - 5.25);
-    const double length = found.lengths[static_cast<std::size_t>(at)];
-    CHECK(length >= straight - 1e-9 && length <= 1.09 * straight + 1e-9);
+/// The floor of a table is never shorter than a straight line, nor longer than the detour of a grid,
+/// and no length to go is shorter than it.
+void tables_measure_lengths() {
+  const std::vector<Vec2> corners = tests::rectangle(-0.2, -0.2, 0.2, 0.2);
+  const std::vector<Index> offsets{0, 4};
+  const std::vector<Index> none{0};
+  const ConvexObstacles walls{{{}, none}, {}, {}, {0.0, 0.0, 10.0, 10.0}};
+  const GoalRegion goal{GoalRegion::Kind::kDisc, {5.0, 5.0}, {}, 0.1};
+  CostToGoMaker maker({{corners, offsets}, 0.3}, walls, goal, 0.3, 0.5);
+  while (!maker.done()) maker.step();
+  const CostToGo table = maker.table();
+  CHECK(maker.useful() && maker.flooded());
+  for (Index at = 0; at < table.floor.size(); ++at) {
+    const Vec2 centre = table.cells.centre(at / table.columns(), at % table.columns());
+    const double straight = std::hypot(centre.x - 5.0, centre.y - 5.0);
+    const double floor = table.floor.data()[at];
+    if (centre.x > 10.0 || centre.y > 10.0) continue;  // out of the bounds
+    CHECK(floor >= straight - 0.1 && floor <= 1.09 * straight + 0.1);
+    CHECK(table.length_to_go({centre.x, centre.y, 1.0}) >= straight - 0.2);
   }
 }
 
@@ -335,7 +341,7 @@ int main() {
   pushplan::failing_pushes_stop();
   pushplan::lost_pushes_stop();
   pushplan::rollouts_keep_to_limits();
-  pushplan::floods_measure_lengths();
+  pushplan::tables_measure_lengths();
   pushplan::pose_searches_are_exact();
   pushplan::goals_and_carrots_are_where_they_are();
   pushplan::ice_adds_to_the_cost_to_go();

@@ -68,8 +68,6 @@ class Clearance:
 
     def gaps(self, contact: BoxContact, normal: float, state: Annotated[NDArray[numpy.float64], dict(shape=(6), order='C', device='cpu', writable=False)], obstacles: pushplan._core.geometry.Obstacles) -> tuple[float, float]: ...
 
-    def free_fraction(self, contact: BoxContact, normal: float, start: Annotated[NDArray[numpy.float64], dict(shape=(6), order='C', device='cpu', writable=False)], v: float, w: float, duration: float, obstacles: pushplan._core.geometry.Obstacles) -> float: ...
-
 class PushWeights:
     """Costs and scales of the cost."""
 

@@ -2,12 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 namespace pushplan::mpc {
 namespace {
 
-constexpr std::size_t kSent = 256;  // commands under way; of more than these the oldest count no more
+// heading errors from which a robot turns towards the path first [rad]
+constexpr double kTurnStopped = 0.25 * std::numbers::pi;
+constexpr double kTurnDriving = 0.5 * std::numbers::pi;
+constexpr std::size_t kSent =
+    256;  // commands under way; of more than these the oldest count no more
 
 /// The first variables of the blocks whose changes the robot limits.
 std::vector<Index> limited_blocks(const CommandLimits& limits, std::span<const Index> columns,
@@ -21,6 +26,32 @@ std::vector<Index> limited_blocks(const CommandLimits& limits, std::span<const I
 }
 
 }  // namespace
+
+Twist CommandLimits::nearest(const Twist& wanted, const Twist& last, double held,
+                             bool ramps) const {
+  Twist command = wanted;
+  if (ramps) {
+    const double dv = max_acceleration * held;
+    const double dw = max_turn_acceleration * held;
+    command.v = std::min(std::max(command.v, last.v - dv), last.v + dv);
+    command.w = std::min(std::max(command.w, last.w - dw), last.w + dw);
+  }
+  if (constant) command.v = max_speed;
+  command.v = std::min(std::max(command.v, min_speed), max_speed);
+  double most = max_turn_rate;
+  if (turning_radius > 0.0) most = std::min(most, std::abs(command.v) / turning_radius);
+  command.w = std::min(std::max(command.w, -most), most);
+  return command;
+}
+
+double CommandLimits::turn_from() const {
+  const bool on_the_spot = !constant && turning_radius == 0.0;
+  return on_the_spot ? kTurnStopped : kTurnDriving;
+}
+
+double CommandLimits::turning_speed() const {
+  return std::min(max_speed, max_turn_rate * turning_radius);
+}
 
 Horizon::Horizon(const CommandLimits& limits_, std::vector<Index> columns_, Index count_,
                  Index moves, const SolverSettings& solver_, const Twist& before)
@@ -100,22 +131,8 @@ void Horizon::keep_solution() {
 }
 
 Twist Horizon::send(const Twist& wanted, double held, bool ramps) {
-  Twist command = wanted;
-  if (ramps) {
-    const double dv = limits.max_acceleration * held;
-    const double dw = limits.max_turn_acceleration * held;
-    command.v = std::min(std::max(command.v, last.v - dv), last.v + dv);
-    command.w = std::min(std::max(command.w, last.w - dw), last.w + dw);
-  }
-  if (limits.constant) command.v = limits.max_speed;
-  command.v = std::min(std::max(command.v, limits.min_speed), limits.max_speed);
-  double most = limits.max_turn_rate;
-  if (limits.turning_radius > 0.0) {
-    most = std::min(most, std::abs(command.v) / limits.turning_radius);
-  }
-  command.w = std::min(std::max(command.w, -most), most);
-  last = command;
-  return command;
+  last = limits.nearest(wanted, last, held, ramps);
+  return last;
 }
 
 void Horizon::remember(double time, double over) {

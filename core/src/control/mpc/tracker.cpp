@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
+
+#include "pushplan/control/pure_pursuit.hpp"
 
 namespace pushplan::mpc {
 namespace {
@@ -11,9 +12,6 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kBack = 0.25;   // greatest move back of the place from one call to the next [R]
 constexpr double kWindow = 2.0;  // distance ahead in which the next place is looked for [R]
-// heading errors from which a robot turns towards the path first [rad]
-constexpr double kTurnStopped = 0.25 * std::numbers::pi;
-constexpr double kTurnDriving = 0.5 * std::numbers::pi;
 
 /// Speed [m/s] that the plan has at a place, and that still allows to stop at its end.
 double speed_at(const ReferencePath& track, const PathPlace& place, const Tuning& tuning,
@@ -165,7 +163,7 @@ void Tracker::begin_track() {
 
 Twist Tracker::follow(const ReferencePath& track, const Pose& pose, double time, double held) {
   Twist command;
-  if (is_finite(pose)) {
+  if (is_finite(pose) && !track.poses.empty()) {
     command = command_for(track, pose, time, held);
   } else {
     horizon_.known = false;
@@ -188,11 +186,11 @@ Twist Tracker::command_for(const ReferencePath& track, const Pose& pose, double 
     horizon_.known = false;
     return horizon_.send({0.0, 0.0}, held, true);
   }
-  if (std::abs(error) > turn_from()) {
+  if (std::abs(error) > horizon_.limits.turn_from()) {
     // too far from the path's heading for a linear model: turn towards it first
     horizon_.known = false;
     const double turn = std::copysign(tuning_.max_turn_rate, -error);
-    return horizon_.send({turning_speed(), turn}, held, true);
+    return horizon_.send({horizon_.limits.turning_speed(), turn}, held, true);
   }
   horizon_.set_bounds(horizon_.steps[0], horizon_.steps[1]);
   QuadraticProgram& program = horizon_.program;
@@ -207,18 +205,6 @@ Twist Tracker::command_for(const ReferencePath& track, const Pose& pose, double 
   horizon_.keep_solution();
   horizon_.missed = 0;
   return horizon_.send(horizon_.solution[0], held, false);
-}
-
-/// The heading error from which the robot turns towards the path first [rad].
-double Tracker::turn_from() const {
-  const bool on_the_spot = tuning_.stops && horizon_.limits.turning_radius == 0.0;
-  return on_the_spot ? kTurnStopped : kTurnDriving;
-}
-
-/// The speed at which a robot that can stop turns as fast as it can [m/s].
-double Tracker::turning_speed() const {
-  const CommandLimits& limits = horizon_.limits;
-  return std::min(limits.max_speed, limits.max_turn_rate * limits.turning_radius);
 }
 
 /// Moves the last solution on by the time that has passed since; NaN past its end.
@@ -254,42 +240,7 @@ Twist Tracker::fall_back(const ReferencePath& track, const Pose& pose, double he
   const bool known = horizon_.known && std::isfinite(ahead.v) && std::isfinite(ahead.w);
   if (known && horizon_.missed < horizon_.count()) return horizon_.send(ahead, held, true);
   horizon_.known = false;
-  return horizon_.send(pursue(track, pose), held, true);
-}
-
-Twist Tracker::pursue(const ReferencePath& track, const Pose& pose) const {
-  const auto lengths = track.lengths;
-  const auto poses = track.poses;
-  const std::size_t last = lengths.size() - 1;
-  const double aim = place_ + tuning_.size;
-  std::size_t i = 0;
-  while (i < last && lengths[i + 1] <= place_) ++i;
-  double speed = track.speeds[i];
-  while (i + 1 < last && lengths[i + 1] < aim) ++i;
-  Vec2 target;
-  if (aim >= lengths[last]) {  // continue the last heading beyond the end
-    const double over = aim - lengths[last];
-    target = {poses[last].x + over * std::cos(poses[last].theta),
-              poses[last].y + over * std::sin(poses[last].theta)};
-  } else {
-    const double fraction = (aim - lengths[i]) / (lengths[i + 1] - lengths[i]);
-    target = {poses[i].x + fraction * (poses[i + 1].x - poses[i].x),
-              poses[i].y + fraction * (poses[i + 1].y - poses[i].y)};
-  }
-  const double dx = target.x - pose.x;
-  const double dy = target.y - pose.y;
-  const double bearing = wrap_angle(std::atan2(dy, dx) - pose.theta);
-  if (std::abs(bearing) > turn_from()) {
-    const double turn = std::copysign(tuning_.max_turn_rate, bearing);
-    return {tuning_.stops ? turning_speed() : speed, turn};
-  }
-  double curvature = 2.0 * std::sin(bearing) / std::max(std::sqrt(dx * dx + dy * dy), 1e-9);
-  const double radius = horizon_.limits.turning_radius;
-  if (radius > 0.0) curvature = std::min(std::max(curvature, -1.0 / radius), 1.0 / radius);
-  if (tuning_.stops && std::abs(curvature) * speed > tuning_.max_turn_rate) {
-    speed = tuning_.max_turn_rate / std::abs(curvature);
-  }
-  return {speed, speed * curvature};
+  return horizon_.send(pursue(track, pose, place_, tuning_.size, horizon_.limits), held, true);
 }
 
 }  // namespace pushplan::mpc

@@ -18,6 +18,14 @@ struct CommandLimits {
   double max_acceleration;       // [m/s^2]
   double max_turn_acceleration;  // [rad/s^2]
   double turning_radius;         // that a car has at any speed [m]; 0 for other drives
+
+  /// The nearest command within the limits, held for a time [s] after another one; `ramps`: within
+  /// the accelerations too.
+  Twist nearest(const Twist& wanted, const Twist& last, double held, bool ramps) const;
+  /// The heading error from which the robot turns towards the path first [rad].
+  double turn_from() const;
+  /// The speed at which a robot that can stop turns as fast as it can [m/s].
+  double turning_speed() const;
 };
 
 /// A command that has been sent.
@@ -36,17 +44,17 @@ struct Horizon {
           const Twist& before);  // the command in force
 
   CommandLimits limits;
-  Twist units;                      // of speed and turn rate in the program
-  std::vector<Index> columns;       // (C,)
+  Twist units;                 // of speed and turn rate in the program
+  std::vector<Index> columns;  // (C,)
   SolverSettings solver;
-  QuadraticProgram program;         // over M commands of each, in units
-  std::vector<double> steps;        // (N,) how long each step is [s]
-  std::vector<double> solved;       // (N,) the same when the last solution was found
-  std::vector<Index> shifted;       // (N,) the step of then that each one lies in; N past the end
-  std::vector<Twist> solution;      // (M,)
-  std::vector<Twist> nominal;       // (M,) what the next program is about
-  Twist last;                       // the command before the first
-  std::vector<SentCommand> sent;    // commands under way, the first `under_way_count` count
+  QuadraticProgram program;       // over M commands of each, in units
+  std::vector<double> steps;      // (N,) how long each step is [s]
+  std::vector<double> solved;     // (N,) the same when the last solution was found
+  std::vector<Index> shifted;     // (N,) the step of then that each one lies in; N past the end
+  std::vector<Twist> solution;    // (M,)
+  std::vector<Twist> nominal;     // (M,) what the next program is about
+  Twist last;                     // the command before the first
+  std::vector<SentCommand> sent;  // commands under way, the first `under_way_count` count
   std::size_t under_way_count = 0;
   bool known = false;  // there is a solution
   Index missed = 0;    // failures of the solver since
@@ -54,9 +62,7 @@ struct Horizon {
 
   Index count() const { return static_cast<Index>(steps.size()); }
   /// The commands under way.
-  std::span<const SentCommand> under_way() const {
-    return std::span(sent).first(under_way_count);
-  }
+  std::span<const SentCommand> under_way() const { return std::span(sent).first(under_way_count); }
 
   /// Sets the steps: the first until the next call, `held`, the others a part of `span` [s].
   void lay_steps(double span, double held);

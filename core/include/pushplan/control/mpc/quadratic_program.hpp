@@ -13,10 +13,10 @@ namespace pushplan::mpc {
 
 /// How a controller solves its programs.
 struct SolverSettings {
-  double tolerance;    // absolute and relative
-  Index iterations;    // after which the solver gives up
-  Index rounds;        // programs for each command
-  Index first_rounds;  // programs for a command without a solution to start from
+  double tolerance = 1e-6;  // absolute and relative
+  Index iterations = 2000;  // after which the solver gives up
+  Index rounds = 1;         // programs for each command
+  Index first_rounds = 4;   // programs for a command without a solution to start from
 };
 
 /// Minimise 1/2 x'Px + q'x over n >= 2 commands in blocks of M >= 2. A caller fills P, q, bounds

@@ -14,7 +14,7 @@
 
 namespace pushplan::mpc {
 
-/// Limits of the robot and weights of the cost.
+/// Limits of the robot and weights of the cost, which `MpcConfig` in Python describes.
 struct Tuning {
   double size;              // R, circumscribed radius [m]
   double max_speed;         // [m/s]
@@ -22,11 +22,11 @@ struct Tuning {
   double max_acceleration;  // [m/s^2]
   bool stops;               // the robot stops at the end of the path
   bool optimise_speed;
-  double heading_weight;
-  double turn_weight;
-  double smoothness;
-  double terminal;
-  double speed_weight;
+  double heading_weight = 0.5;
+  double turn_weight = 0.02;
+  double smoothness = 0.001;
+  double terminal = 4.0;
+  double speed_weight = 0.2;
 };
 
 /// Puts up the tracking problem: P and q of min 1/2 z'Pz + q'z over
@@ -73,21 +73,16 @@ class Tracker {
   void begin_track();
 
   /// The command for where the robot is: of the solution, or what is nearest to it without one. A
-  /// pose that is not finite gives a stop, or the least speed.
+  /// pose that is not finite, or an empty path, gives a stop, or the least speed.
   Twist follow(const ReferencePath& track, const Pose& pose,
                double time,   // of the pose [s]
                double held);  // from the last call to this one [s]
-
-  /// Speed and turn rate on the arc to a point R ahead (Coulter, CMU-RI-TR-92-01).
-  Twist pursue(const ReferencePath& track, const Pose& pose) const;
 
   /// The commands ahead, and how often the solver has failed.
   Horizon& horizon() { return horizon_; }
 
  private:
   Twist command_for(const ReferencePath& track, const Pose& pose, double time, double held);
-  double turn_from() const;
-  double turning_speed() const;
   void shift(double held);
   void predict(const Pose& pose, double time);
   Twist fall_back(const ReferencePath& track, const Pose& pose, double held);
