@@ -8,6 +8,7 @@ from pathlib import Path
 from pushplan.errors import PushplanError
 
 try:
+    from pushplan import _core
     from pushplan._core import (
         COMPILER,
         SOURCES,
@@ -34,6 +35,7 @@ except ImportError as error:
 __all__ = [
     "COMPILER",
     "SOURCES",
+    "cmake_dir",
     "control",
     "envs",
     "geometry",
@@ -57,7 +59,7 @@ def is_stale() -> bool:
     files = {
         path.relative_to(top).as_posix(): path
         for room in ("include", "src", "bindings")
-        for path in (top / "core" / room).rglob("*.[ch]pp")
+        for path in (top / "core" / room).rglob("*.[ch]*")
     }
     if not files:  # an installed package comes without them
         return False
@@ -65,3 +67,15 @@ def is_stale() -> bool:
         f"{name} {hashlib.sha256(files[name].read_bytes()).hexdigest()}\n" for name in sorted(files)
     )
     return hashlib.sha256(listing.encode()).hexdigest()[:12] != SOURCES
+
+
+def cmake_dir() -> Path:
+    """The folder from which CMake's ``find_package(pushplan)`` takes the core for C++ programs.
+
+    Raises:
+        PushplanError: if the module was not installed by pip, which puts the folder beside it.
+    """
+    folder = Path(_core.__file__).parent / "cpp" / "cmake"
+    if not folder.is_dir():
+        raise PushplanError(f"{str(folder)!r} is not there: run pip install, which installs it")
+    return folder

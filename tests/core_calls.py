@@ -25,9 +25,7 @@ import numpy as np
 # as the work. Each is called by one module of Python, which makes them from one checked object.
 # They are called with wrong types only, which nanobind refuses, and not with right ones.
 TABLES_OF_ONE_MAKER = {
-    "control.Horizon.__init__": "19 arrays that control.mpc lays out for one number of steps",
-    "control.Tracker": "its horizon",
-    "control.TrackingAssembly": "arrays of control.mpc, as for the horizon",
+    "control.TrackingAssembly": "arrays of one number of steps, which only tests hand over",
     "envs.PlanarSimulator": "addresses of an engine, and states of its bodies",
     "gtsp.Problem.__init__": "tables that gtsp makes of one checked graph",
     "gtsp.RuinRecreate.narrow": "a part of the same tables",
@@ -41,12 +39,11 @@ TABLES_OF_ONE_MAKER = {
     "motion.place_costs": "a part of the lattice",
     "motion.swath_sum": "a part of the lattice",
     "motion.sweep_cells": "cells of a footprint of a checked size",
-    "pushing.PushAssembly": "arrays of planners.pushing, as for the horizon",
-    "pushing.PushingProblem": "arrays of planners.pushing, as for the horizon",
-    "pushing.PushTracker": "its horizon",
+    "pushing.PushAssembly": "arrays of one number of steps, which only tests hand over",
+    "pushing.PushingProblem": "arrays of one number of steps, which only tests hand over",
 }
 # Numbers of rounds: a large one is meant to take long.
-ROUNDS = {"budget", "iterations", "most", "rounds", "steps", "tries"}
+ROUNDS = {"budget", "first_rounds", "iterations", "most", "rounds", "steps", "tries"}
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 SQUARES = np.vstack([SQUARE, SQUARE + np.array([3.0, 0.0])])
@@ -173,18 +170,6 @@ VALID: dict[str, Any] = {
     "motion.dubins.arcs": np.zeros((3, 2)),
     "motion.sample_pieces.out": np.zeros((30, 3)),
     "motion.sample_pieces.curvatures": np.zeros(30),
-    "motion.copy_start.poses": PATH,
-    "motion.copy_start.curvatures": np.zeros(8),
-    "motion.copy_start.out": np.zeros((9, 3)),
-    "motion.copy_start.out_curvatures": np.zeros(9),
-    "motion.lay_dubins.out": np.zeros((99, 3)),
-    "motion.lay_dubins.curvatures": np.zeros(99),
-    "motion.lay_dubins.most_turn": 99.0,
-    "motion.copy_rest.poses": PATH,
-    "motion.copy_rest.curvatures": np.zeros(8),
-    "motion.copy_rest.out": np.zeros((9, 3)),
-    "motion.copy_rest.out_curvatures": np.zeros(9),
-    "motion.copy_rest.size": 2,
     "motion.prefix_sums.sums": np.zeros((4, 7)),
     "motion.place_costs.sums": np.zeros((9, 10)),
     "motion.place_costs.rows": [3, 4],
@@ -229,6 +214,11 @@ VALID: dict[str, Any] = {
     "motion.SweptPath.works": np.zeros(8),
     "motion.sweep_cost.count": 5,
     "motion.shortcut.count": 5,
+    "motion.fill_speed_profile.curvatures": np.zeros(8),
+    "motion.fill_speed_profile.chords": np.full(7, 0.2),
+    "motion.fill_speed_profile.times": np.zeros(8),
+    "motion.fill_speed_profile.speeds": np.zeros(8),
+    "motion.fill_speed_profile.turn_rates": np.zeros(8),
     "motion.turn_freely.out": np.zeros((2, 3)),
     "motion.fill_cell_weights.out": np.zeros((4, 4)),
     "motion.fill_cell_weights.within": [[0, 0, 2, 2], [0, 0, 2, 2]],
@@ -238,20 +228,12 @@ VALID: dict[str, Any] = {
     "observation.fill_hidden.table": np.zeros((4, 4, 2)),
     "observation.fill_hidden.bends": [0, 1],
     # planners
-    "planners.CostToGo.values": np.ones((4, 4, 8)),
-    "planners.CostToGo.floor": np.ones((4, 4)),
-    "planners.CostToGo.sweep.values": np.ones((4, 4, 8)),
-    "planners.CostToGo.sweep.free": np.ones((4, 4, 8)),
-    "planners.CostToGo.sweep.ends": np.full((8, 3, 3), 0.3),
-    "planners.mark_free.free": np.zeros((4, 4, 8)),
-    "planners.mark_free.last": 16,
-    "planners.flood.open": np.ones((4, 4)),
-    "planners.flood.lengths": np.zeros((4, 4)),
+    "planners.CostToGo.size": 15.0,
     "planners.PushTree.nodes": 100,
     "planners.PushTree.objects": 2,
     "planners.PushTree.rows": 4,
     "planners.PushTree.columns": 4,
-    "planners.PushTree.headings": 8,
+    "planners.PushTree.headings": 32,
     "planners.PushTree.cost.node": 0,
     "planners.PushTree.arcs_to.node": 0,
     "planners.push_search.size": 200,
@@ -284,7 +266,6 @@ VALID: dict[str, Any] = {
     "pushing.BoxContact.roll_out.steps": np.full(3, 0.1),
     "pushing.BoxContact.roll_out.states": np.zeros((4, 6)),
     "pushing.BoxContact.roll_out.motions": np.zeros((3, 6)),
-    "pushing.Faces.scores": np.zeros((2, 3)),
     "pushing.PushingProblem.groups": [0, 0],
     "pushing.PushWeights.half": 0.3,
     "pushing.PushAssembly.steps": 2,
@@ -294,18 +275,15 @@ VALID: dict[str, Any] = {
     "control.ReferencePath.poses": PATH,
     "control.ReferencePath.lengths": 0.2 * np.arange(8),
     "control.ReferencePath.speeds": np.ones(8),
-    "control.Horizon.columns": [0, 1],
-    "control.Horizon.moves": 2,
-    "control.Horizon.blocks": [0, 2],
-    "control.Horizon.hessian": np.zeros((4, 4)),
-    "control.Horizon.gradient": np.zeros(4),
-    "control.Horizon.low": np.zeros(8),
-    "control.Horizon.high": np.zeros(8),
-    "control.Horizon.x": np.zeros(4),
-    "control.Horizon.shifted": [0, 1],
-    "control.Horizon.sent": np.zeros((4, 3)),
-    "control.Horizon.counts": [0, 0, 0, 0],
-    "control.Horizon.last": [0.0, 0.0],
+    "control.QuadraticProgram.variables": 4,
+    "control.QuadraticProgram.moves": 2,
+    "control.QuadraticProgram.blocks": [0, 2],
+    "control.QuadraticProgram.solve.hessian": np.eye(4),
+    "control.QuadraticProgram.solve.gradient": np.ones(4),
+    "control.QuadraticProgram.solve.low": -np.ones(8),
+    "control.QuadraticProgram.solve.high": np.ones(8),
+    "control.QuadraticProgram.solve.x": np.zeros(4),
+    "control.Tracker.steps": 2,
     "control.Tuning.optimise_speed": True,
     "control.TrackingAssembly.variables": 4,
     "control.TrackingAssembly.assemble.hessian": np.zeros((4, 4)),
@@ -344,8 +322,19 @@ VALID: dict[str, Any] = {
     "search.GridDijkstra.goals": np.zeros((4, 4)),
     "search.GridDijkstra.settle.goals": np.zeros((4, 4)),
 }
+
+
+def pushed_box() -> tuple[Any, ...]:
+    """A face of a square, what is kept clear, and the direction of the push."""
+    pushing = importlib.import_module("pushplan._core").pushing
+    contact = pushing.BoxContact(0.3, 0.2, 0.0, 0.1, -0.1, 0.1, 0.05, 0.3)
+    parts = pushing.Clearance(SQUARES, np.array(OFFSETS), np.ones(2), 0.01, 0.001)
+    return [pushing.Face(np.array([1.0, 0.0, 0.0]), contact, 0.0, -1.0)], parts, 0.0
+
+
 # What an object needs before it answers.
 PREPARED = {
+    "pushing.PushTracker": lambda tracker: tracker.begin(*pushed_box()),
     "search.SearchTree": lambda tree: (tree.clear(), tree.offer(1, 0.5, 0.5, -1, 0)),
     "planners.PushTree": lambda tree: tree.plant(
         np.array([-1.0, 0.0, 0.0]), np.array(VALID["objects"]), 1.0

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-HEAVY = ("pymunk", "mujoco", "gymnasium", "torch", "matplotlib")
+HEAVY = ("pymunk", "mujoco", "gymnasium", "torch", "matplotlib", "osqp", "casadi")
 ROOMS = (
     "world",
     "geometry",
@@ -31,11 +31,6 @@ CASES = {
         "main(['plan', 'examples/room.yaml', '--planner', 'straight'])\n"
         + LOADED.format(names=HEAVY),
         "[]",
-    ),
-    "the solver of the tracker, which alone needs it": (
-        "import sys, pushplan.control as c\nbefore = 'osqp' in sys.modules\nc.MpcTracker()\n"
-        "print(before, 'osqp' in sys.modules, 'casadi' in sys.modules)",
-        "False True False",
     ),
     "gtsp, which knows no robot": (
         "import sys; from pushplan.gtsp import read_gtsp, solve_gtsp\n"

@@ -1,8 +1,7 @@
-#include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 
 #include <algorithm>
-#include <optional>
+#include <limits>
 
 #include "arrays.hpp"
 #include "pushplan/control/mpc/tracker.hpp"
@@ -14,12 +13,12 @@ using namespace nb::literals;
 
 namespace {
 
-using Counts = nb::ndarray<Index, nb::shape<4>, nb::c_contig, nb::device::cpu>;
+constexpr Index kMostVariables = 2000;  // of a program, whose P is dense
 
 /// A command as Python has it: speed [m/s], turn rate [rad/s].
 std::pair<double, double> numbers(const mpc::Twist& twist) { return {twist.v, twist.w}; }
 
-void bind_horizon(nb::module_& module) {
+void bind_program(nb::module_& module) {
   nb::class_<mpc::CommandLimits>(module, "CommandLimits")
       .def(
           "__init__",
@@ -32,48 +31,54 @@ void bind_horizon(nb::module_& module) {
           },
           "constant"_a, "min_speed"_a, "max_speed"_a, "max_turn_rate"_a, "max_acceleration"_a,
           "max_turn_acceleration"_a, "turning_radius"_a);
-  nb::class_<mpc::Horizon>(module, "Horizon", "Commands for the next steps, in arrays of Python.")
+  nb::class_<mpc::SolverSettings>(module, "SolverSettings")
       .def(
           "__init__",
-          [](mpc::Horizon* self, const mpc::CommandLimits& limits, const Numbers<2>& units,
-             const Integers<1>& columns, Index moves, const Integers<1>& blocks,
-             const FloatsOut<2>& hessian, const FloatsOut<1>& gradient, const FloatsOut<1>& low,
-             const FloatsOut<1>& high, const FloatsOut<1>& x, const FloatsOut<1>& steps,
-             const FloatsOut<1>& solved, const IntegersOut<1>& shifted,
-             const FloatsOut<2>& solution, const FloatsOut<2>& nominal, const NumbersOut<2>& last,
-             const FloatsOut<2>& sent, const Counts& counts) {
-            new (self) mpc::Horizon{limits,
-                                    {units.data()[0], units.data()[1]},
-                                    view(columns),
-                                    {moves, view(blocks), view(hessian), view(gradient), view(low),
-                                     view(high), view(x)},
-                                    view(steps),
-                                    view(solved),
-                                    view(shifted),
-                                    rows_as<mpc::Twist>(solution),
-                                    rows_as<mpc::Twist>(nominal),
-                                    reinterpret_cast<mpc::Twist*>(last.data()),
-                                    rows_as<mpc::SentCommand>(sent),
-                                    reinterpret_cast<mpc::HorizonCounts*>(counts.data())};
+          [](mpc::SolverSettings* self, double tolerance, Index iterations, Index rounds,
+             Index first_rounds) {
+            if (!(tolerance > 0.0)) refuse("tolerance", std::to_string(tolerance), "more than 0");
+            require_between("iterations", iterations, 1, std::numeric_limits<int>::max());
+            new (self) mpc::SolverSettings{tolerance, iterations, rounds, first_rounds};
           },
-          "limits"_a, "units"_a.noconvert(), "columns"_a.noconvert(), "moves"_a,
-          "blocks"_a.noconvert(), "hessian"_a.noconvert(), "gradient"_a.noconvert(),
-          "low"_a.noconvert(), "high"_a.noconvert(), "x"_a.noconvert(), "steps"_a.noconvert(),
-          "solved"_a.noconvert(), "shifted"_a.noconvert(), "solution"_a.noconvert(),
-          "nominal"_a.noconvert(), "last"_a.noconvert(), "sent"_a.noconvert(),
-          "counts"_a.noconvert(), nb::keep_alive<1, 4>(), nb::keep_alive<1, 6>(),
-          nb::keep_alive<1, 7>(), nb::keep_alive<1, 8>(), nb::keep_alive<1, 9>(),
-          nb::keep_alive<1, 10>(), nb::keep_alive<1, 11>(), nb::keep_alive<1, 12>(),
-          nb::keep_alive<1, 13>(), nb::keep_alive<1, 14>(), nb::keep_alive<1, 15>(),
-          nb::keep_alive<1, 16>(), nb::keep_alive<1, 17>(), nb::keep_alive<1, 18>(),
-          nb::keep_alive<1, 19>())
+          "tolerance"_a, "iterations"_a, "rounds"_a, "first_rounds"_a);
+  nb::class_<mpc::QuadraticProgram>(module, "QuadraticProgram",
+                                    "A quadratic program over commands, and its solver.")
       .def(
-          "send",
-          [](mpc::Horizon& self, double v, double w, double held, bool ramps) {
-            return numbers(self.send({v, w}, held, ramps));
+          "__init__",
+          [](mpc::QuadraticProgram* self, Index variables, Index moves, const Integers<1>& blocks,
+             const mpc::SolverSettings& settings) {
+            require_between("moves", moves, 2, kMostVariables);
+            require_between("variables", variables, moves, kMostVariables);
+            Index least = 0;  // blocks do not overlap
+            for (const Index first : view(blocks)) {
+              require_between("blocks", first, least, variables - moves);
+              least = first + moves;
+            }
+            new (self) mpc::QuadraticProgram(
+                variables, moves, {blocks.data(), blocks.data() + blocks.size()}, settings);
           },
-          "v"_a, "w"_a, "held"_a, "ramps"_a)
-      .def("remember", &mpc::Horizon::remember, "time"_a, "over"_a);
+          "variables"_a, "moves"_a, "blocks"_a.noconvert(), "settings"_a)
+      .def(
+          "solve",
+          [](mpc::QuadraticProgram& self, const Floats<2>& hessian, const Floats<1>& gradient,
+             const Floats<1>& low, const Floats<1>& high, const FloatsOut<1>& x) {
+            require_count("hessian", hessian.shape(0), self.x.size());
+            const auto fill = [](const char* name, const auto& from, std::vector<double>& to) {
+              require_count(name, from.size(), to.size());
+              std::copy_n(from.data(), to.size(), to.begin());
+            };
+            fill("hessian", hessian, self.curvatures);
+            fill("gradient", gradient, self.gradient);
+            fill("low", low, self.low);
+            fill("high", high, self.high);
+            fill("x", x, self.x);
+            const bool solved = self.solve();
+            std::ranges::copy(self.x, x.data());
+            return solved;
+          },
+          "hessian"_a.noconvert(), "gradient"_a.noconvert(), "low"_a.noconvert(),
+          "high"_a.noconvert(), "x"_a.noconvert(), ReleaseGil(),
+          "Minimise from x, in place; False if OSQP does not call its answer solved.");
 }
 
 void bind_path(nb::module_& module) {
@@ -137,28 +142,23 @@ void bind_tracker(nb::module_& module) {
           "steps"_a.noconvert(), "nominal"_a.noconvert(), "hessian"_a.noconvert(),
           "gradient"_a.noconvert(), ReleaseGil());
   nb::class_<mpc::Tracker>(module, "Tracker", "A predictive tracker of one robot.")
-      .def(nb::init<const mpc::Horizon&, const mpc::Tuning&, double, double>(), "horizon"_a,
-           "tuning"_a, "span"_a, "delay"_a, nb::keep_alive<1, 2>())
+      .def(
+          "__init__",
+          [](mpc::Tracker* self, const mpc::CommandLimits& limits, const mpc::Tuning& tuning,
+             const mpc::SolverSettings& solver, Index steps, double span, double delay, double v,
+             double w) {
+            require_between("steps", steps, 2, kMostVariables / 2);
+            new (self) mpc::Tracker(limits, tuning, solver, steps, span, delay, {v, w});
+          },
+          "limits"_a, "tuning"_a, "solver"_a, "steps"_a, "span"_a, "delay"_a, "v"_a, "w"_a)
       .def("begin_track", &mpc::Tracker::begin_track)
       .def(
-          "begin_step",
+          "follow",
           [](mpc::Tracker& self, const mpc::ReferencePath& track, const OnePose& at, double time,
-             double held) -> std::optional<std::pair<double, double>> {
-            const auto known = self.begin_step(track, pose(at), time, held);
-            if (!known) return std::nullopt;
-            return numbers(*known);
-          },
+             double held) { return numbers(self.follow(track, pose(at), time, held)); },
           "track"_a, "pose"_a.noconvert(), "time"_a, "held"_a, ReleaseGil(),
-          "Put up the program for where the robot is; the command where it is known without one.")
-      .def("assemble_step", &mpc::Tracker::assemble_step, "track"_a, ReleaseGil())
-      .def(
-          "finish_step",
-          [](mpc::Tracker& self, const mpc::ReferencePath& track, const OnePose& at, double time,
-             double held, bool solved) {
-            return numbers(self.finish_step(track, pose(at), time, held, solved));
-          },
-          "track"_a, "pose"_a.noconvert(), "time"_a, "held"_a, "solved"_a, ReleaseGil(),
-          "The command: of the solution, or what is nearest to it without one.");
+          "The command for where the robot is; a stop where that is not finite.")
+      .def_prop_ro("failures", [](mpc::Tracker& self) { return self.horizon().failed; });
 }
 
 void bind_waiting(nb::module_& module) {
@@ -176,7 +176,7 @@ void bind_waiting(nb::module_& module) {
 }  // namespace
 
 void bind_control(nb::module_& module) {
-  bind_horizon(module);
+  bind_program(module);
   bind_path(module);
   bind_tracker(module);
   bind_waiting(module);

@@ -365,14 +365,6 @@ void bind_path_search(nb::module_& module) {
       .def_prop_ro(
           "first", [](const ObstacleGrid& s) { return copied(s.first()); }, kOwned)
       .def_prop_ro("items", [](const ObstacleGrid& s) { return copied(s.items()); }, kOwned);
-  nb::class_<GridSight>(module, "GridSight", "Tests of sight with memory for one thread.")
-      .def(nb::init<const ObstacleGrid&>(), "grid"_a, nb::keep_alive<1, 2>())
-      .def(
-          "sees",
-          [](GridSight& self, double px, double py, double qx, double qy, double margin) {
-            return self.sees({px, py}, {qx, qy}, margin);
-          },
-          "px"_a, "py"_a, "qx"_a, "qy"_a, "margin"_a);
   nb::class_<Corners>(module, "Corners", "Corners by obstacle, then ends on the goal's rim.")
       .def(
           "__init__",
@@ -410,7 +402,6 @@ void bind_path_search(nb::module_& module) {
           nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>(), nb::keep_alive<1, 5>(), ReleaseGil())
       .def("run", &VisibilitySearch::run, "budget"_a, ReleaseGil())
       .def_prop_ro("end", &VisibilitySearch::end)
-      .def_prop_ro("lines_tested", &VisibilitySearch::lines_tested)
       .def_prop_ro(
           "parents", [](const VisibilitySearch& s) { return copied(s.parents()); }, kOwned);
 }

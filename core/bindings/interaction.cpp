@@ -152,10 +152,6 @@ void bind_interaction(nb::module_& module) {
           "robot_from"_a.noconvert(), "robot_to"_a.noconvert(), "poses"_a.noconvert(),
           "lengths"_a.noconvert(), ReleaseGil())
       .def(
-          "robot_held",
-          [](QuasiStatic& self, const OnePose& at) { return self.robot_held(pose(at)); },
-          "pose"_a.noconvert(), ReleaseGil())
-      .def(
           "sweep",
           [](QuasiStatic& self, const Poses& path, const PosesOut& objects,
              const FloatsOut<3>& out) {

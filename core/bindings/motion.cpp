@@ -7,7 +7,6 @@
 #include "arrays.hpp"
 #include "goal.hpp"
 #include "pushplan/motion/goal_region.hpp"
-#include "pushplan/motion/shortcut.hpp"
 #include "pushplan/motion/state_lattice/cost_map.hpp"
 #include "pushplan/motion/state_lattice/place_costs.hpp"
 #include "pushplan/motion/state_lattice/pose_lattice.hpp"
@@ -27,13 +26,6 @@ using LatticeSearch = AStar<PoseLattice>;
 PathBuffer buffer(const PosesOut& out, const FloatsOut<1>& curvatures) {
   require_count("curvatures", curvatures.shape(0), out.shape(0));
   return {poses(out), view(curvatures)};
-}
-
-/// A path of which pose `last` is one.
-Path path_to(const Poses& path, const Floats<1>& curvatures, Index last) {
-  require_count("curvatures", curvatures.shape(0), path.shape(0));
-  require_index("last", last, static_cast<Index>(path.shape(0)));
-  return {poses(path), view(curvatures)};
 }
 
 using ThreeArcs = nb::ndarray<double, nb::shape<3, 2>, nb::c_contig, nb::device::cpu>;
@@ -76,42 +68,6 @@ void bind_paths(nb::module_& module) {
       "distance_to_goal",
       [](double x, double y, const Numbers<5>& goal) { return goal_region(goal).distance({x, y}); },
       "x"_a, "y"_a, "goal"_a.noconvert());
-  module.def(
-      "displace",
-      [](const OnePose& at, double sideways, double turn, const OnePoseOut& out) {
-        *reinterpret_cast<Pose*>(out.data()) = displace(pose(at), sideways, turn);
-      },
-      "pose"_a.noconvert(), "sideways"_a, "turn"_a, "out"_a.noconvert());
-  module.def(
-      "copy_start",
-      [](const Poses& path, const Floats<1>& curvatures, Index last, const PosesOut& out,
-         const FloatsOut<1>& out_curvatures) {
-        const Path whole = path_to(path, curvatures, last);
-        require_room("out", out.shape(0), static_cast<std::size_t>(last + 1));
-        return copy_start(whole, last, buffer(out, out_curvatures));
-      },
-      "poses"_a.noconvert(), "curvatures"_a.noconvert(), "last"_a, "out"_a.noconvert(),
-      "out_curvatures"_a.noconvert());
-  module.def(
-      "lay_dubins",
-      [](const OnePose& start, const OnePose& end, double radius, double spacing, double most_turn,
-         const PosesOut& out, const FloatsOut<1>& curvatures) {
-        return lay_dubins(pose(start), pose(end), {radius, spacing, most_turn},
-                          buffer(out, curvatures));
-      },
-      "start"_a.noconvert(), "end"_a.noconvert(), "radius"_a, "spacing"_a, "most_turn"_a,
-      "out"_a.noconvert(), "curvatures"_a.noconvert());
-  module.def(
-      "copy_rest",
-      [](const Poses& path, const Floats<1>& curvatures, Index last, const PosesOut& out,
-         const FloatsOut<1>& out_curvatures, Index size) {
-        const Path whole = path_to(path, curvatures, last);
-        const Index rest = whole.size() - 1 - last;
-        require_between("size", size, 1, static_cast<Index>(out.shape(0)) - rest);
-        return copy_rest(whole, last, buffer(out, out_curvatures), size);
-      },
-      "poses"_a.noconvert(), "curvatures"_a.noconvert(), "last"_a, "out"_a.noconvert(),
-      "out_curvatures"_a.noconvert(), "size"_a);
 }
 
 /// Requires a place on a map that may be large, but not so large that its cells cannot be counted.

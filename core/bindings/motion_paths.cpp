@@ -10,6 +10,7 @@
 #include "pushplan/motion/recovery.hpp"
 #include "pushplan/motion/room_ahead.hpp"
 #include "pushplan/motion/shortcutting.hpp"
+#include "pushplan/motion/speed_profile.hpp"
 #include "pushplan/motion/turn_on_spot.hpp"
 
 namespace pushplan::bindings {
@@ -174,6 +175,30 @@ void bind_problems(nb::module_& module) {
   bind_sweeps<CalledInteraction>(module);
 }
 
+void bind_speed_profile(nb::module_& module) {
+  nb::class_<SpeedLimits>(module, "SpeedLimits", "Limits of a robot along a path.")
+      .def(nb::init<double, double, double, double, double, double, bool, double, double>(),
+           "size"_a, "max_speed"_a, "min_speed"_a, "turn_rate"_a, "max_acceleration"_a,
+           "max_turn_acceleration"_a, "can_stop"_a, "driven_speed"_a, "driven_turn_rate"_a);
+  module.def(
+      "fill_speed_profile",
+      [](const Poses& path, const Floats<1>& curvatures, const Floats<1>& chords,
+         const SpeedLimits& limits, const FloatsOut<1>& times, const FloatsOut<1>& speeds,
+         const FloatsOut<1>& turn_rates) {
+        const std::size_t count = path.shape(0);
+        require_room("path", count, 1);
+        require_count("curvatures", curvatures.shape(0), count);
+        require_count("chords", chords.shape(0), count - 1);
+        require_count("times", times.shape(0), count);
+        require_count("speeds", speeds.shape(0), count);
+        require_count("turn_rates", turn_rates.shape(0), count);
+        fill_speed_profile({poses(path), view(curvatures)}, view(chords), limits,
+                           {view(times), view(speeds), view(turn_rates)});
+      },
+      "path"_a.noconvert(), "curvatures"_a.noconvert(), "chords"_a.noconvert(), "limits"_a,
+      "times"_a.noconvert(), "speeds"_a.noconvert(), "turn_rates"_a.noconvert());
+}
+
 constexpr Index kMostBoxes = 30'000;  // of poses, in each direction
 
 /// An exploration with the moves that it tries.
@@ -273,6 +298,7 @@ void bind_ways_out(nb::module_& module) {
 void bind_motion_paths(nb::module_& module) {
   bind_collision(module);
   bind_problems(module);
+  bind_speed_profile(module);
   bind_ways_out(module);
 }
 

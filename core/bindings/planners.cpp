@@ -20,9 +20,6 @@ using namespace nb::literals;
 
 namespace {
 
-using Flags2 = Array<const bool, 2>;
-using Flags3 = Array<const bool, 3>;
-
 /// `PushLattice` and its search, whatever the model of interaction is.
 class PushSearch {
  public:
@@ -45,77 +42,32 @@ class PushSearchOver final : public PushSearch {
   AStar<PushLattice<M>> search_;
 };
 
-/// Requires the cells of a grid that are counted row by row.
-void require_cells(Index first, Index last, Index count) {
-  require_between("last", last, 0, count);
-  require_between("first", first, 0, last);
-}
-
 void bind_cost_to_go(nb::module_& module) {
-  nb::class_<CostToGo>(module, "CostToGo", "A table of lengths to the goal.")
+  nb::class_<CostToGoMaker>(module, "CostToGo", "A table of lengths to the goal, made in steps.")
       .def(
           "__init__",
-          [](CostToGo* self, const Floats<3>& values, const Floats<2>& floor, double x, double y,
-             double cell) {
-            require_room("values", values.size(), 1);
-            require_count("rows of floor", floor.shape(0), values.shape(0));
-            require_count("columns of floor", floor.shape(1), values.shape(1));
-            new (self) CostToGo{view(values), view(floor), {{x, y}, cell}};
+          [](CostToGoMaker* self, const Footprint& footprint, const ConvexObstacles& walls,
+             const Numbers<5>& goal, double size, double radius) {
+            if (!(radius > 0.0)) refuse("radius", std::to_string(radius), "positive");
+            new (self) CostToGoMaker(footprint, walls, goal_region(goal), size, radius);
           },
-          "values"_a.noconvert(), "floor"_a.noconvert(), "x"_a, "y"_a, "cell"_a,
+          "footprint"_a, "walls"_a, "goal"_a.noconvert(), "size"_a, "radius"_a,
           nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>())
+      .def_prop_ro("useful", &CostToGoMaker::useful)
+      .def_prop_ro("done", &CostToGoMaker::done)
+      .def("step", &CostToGoMaker::step, ReleaseGil())
       .def_prop_ro("shape",
-                   [](const CostToGo& self) {
-                     return std::tuple(self.rows(), self.columns(), self.headings());
+                   [](const CostToGoMaker& self) {
+                     const CostToGo table = self.table();
+                     return std::tuple(table.rows(), table.columns(), table.headings());
                    })
-      .def_prop_ro("cell", [](const CostToGo& self) { return self.cells.step; })
+      .def_prop_ro("cell", [](const CostToGoMaker& self) { return self.table().cells.step; })
       .def(
           "length_to_go",
-          [](const CostToGo& self, double x, double y, double theta) {
-            return self.length_to_go({x, y, theta});
+          [](const CostToGoMaker& self, double x, double y, double theta) {
+            return self.table().length_to_go({x, y, theta});
           },
-          "x"_a, "y"_a, "theta"_a)
-      .def(
-          "sweep",
-          [](const CostToGo& self, const FloatsOut<3>& values, const Flags3& free,
-             const Integers<1>& order, const Floats<3>& ends, double length) {
-            for (const std::size_t axis : {0, 1, 2}) {
-              require_count("values", values.shape(axis), self.values.extent(axis));
-              require_count("free", free.shape(axis), self.values.extent(axis));
-            }
-            require_indices("order", view(order), self.floor.size());
-            require_count("ends", ends.shape(0), self.headings());
-            return sweep_cost_to_go(view(values), self, view(free), view(order),
-                                    {grid_as<const Pose>(ends), length});
-          },
-          "values"_a.noconvert(), "free"_a.noconvert(), "order"_a.noconvert(), "ends"_a.noconvert(),
-          "length"_a, ReleaseGil(), "`values` are those of the table, to write to.");
-  module.def(
-      "mark_free",
-      [](const Array<bool, 3>& free, Index first, Index last, double x, double y, double cell,
-         const Footprint& footprint, const ConvexObstacles& walls) {
-        require_cells(first, last, static_cast<Index>(free.shape(0) * free.shape(1)));
-        mark_free(view(free), first, last, {{x, y}, cell}, footprint, walls);
-      },
-      "free"_a.noconvert(), "first"_a, "last"_a, "x"_a, "y"_a, "cell"_a, "footprint"_a, "walls"_a,
-      ReleaseGil());
-  module.def(
-      "flood",
-      [](const Flags2& open, double x, double y, double cell, const Numbers<5>& goal, Index centre,
-         const FloatsOut<2>& lengths) {
-        require_count("rows of lengths", lengths.shape(0), open.shape(0));
-        require_count("columns of lengths", lengths.shape(1), open.shape(1));
-        require_between("centre", centre, -1, static_cast<Index>(open.size()) - 1);
-        Flood found;
-        {
-          nb::gil_scoped_release released;
-          found = flood(view(open), {{x, y}, cell}, goal_region(goal), centre);
-        }
-        std::copy(found.lengths.begin(), found.lengths.end(), lengths.data());
-        return copied(std::span<const Index>(found.order));
-      },
-      "open"_a.noconvert(), "x"_a, "y"_a, "cell"_a, "goal"_a.noconvert(), "centre"_a,
-      "lengths"_a.noconvert(), kOwned);
+          "x"_a, "y"_a, "theta"_a);
 }
 
 constexpr Index kMostNodes = Index{1} << 31;  // of a tree
@@ -141,9 +93,10 @@ template <InteractionModel M>
 void bind_push_searches(nb::module_& module) {
   module.def(
       "push_search",
-      [](PushTree& tree, const CostToGo& table, const Floats<1>& curvatures, double length,
+      [](PushTree& tree, const CostToGoMaker& maker, const Floats<1>& curvatures, double length,
          double inflation, double pruning_factor, const Floats<1>& masses, double bound,
          const PathProblem& problem, M& model, Index size) -> std::unique_ptr<PushSearch> {
+        const CostToGo table = maker.table();
         require_planted(tree, model);
         require_count("masses", masses.shape(0), model.radii().size());
         require_between("size", size, 2 * tree.capacity(), 2 * kMostNodes);
@@ -342,12 +295,6 @@ void bind_ships(nb::module_& module) {
           "poses"_a.noconvert(), "radii"_a.noconvert(), "masses"_a.noconvert(), "half_beam"_a,
           ReleaseGil())
       .def("fill_table", &IceCostToGo::fill_table, ReleaseGil())
-      .def(
-          "mass_ahead",
-          [](const IceCostToGo& self, double x, double y, double theta) {
-            return self.mass_ahead({x, y, theta});
-          },
-          "x"_a, "y"_a, "theta"_a)
       .def(
           "cost_to_go",
           [](const IceCostToGo& self, double x, double y, double theta) {

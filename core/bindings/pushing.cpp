@@ -23,6 +23,8 @@ using Motions = nb::ndarray<double, nb::shape<-1, 6>, nb::c_contig, nb::device::
 
 using Slopes = nb::ndarray<double, nb::shape<2, 4>, nb::c_contig, nb::device::cpu>;
 
+constexpr Index kMostSteps = 1000;  // of a program, whose P is dense
+
 PushState state_of(const OneState& array) {
   return *reinterpret_cast<const PushState*>(array.data());
 }
@@ -134,7 +136,7 @@ void bind_clearance(nb::module_& module) {
             new (self) Clearance(parts, view(radii), {least, slack});
           },
           "vertices"_a.noconvert(), "offsets"_a.noconvert(), "radii"_a.noconvert(), "least"_a,
-          "slack"_a, nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>())
+          "slack"_a)
       .def(
           "gaps",
           [](Clearance& self, const BoxContact& contact, double normal, const OneState& state,
@@ -142,16 +144,7 @@ void bind_clearance(nb::module_& module) {
             const auto [robot, box] = self.gaps(contact, normal, state_of(state), obstacles);
             return std::pair{robot, box};
           },
-          "contact"_a, "normal"_a, "state"_a.noconvert(), "obstacles"_a, ReleaseGil())
-      .def(
-          "free_fraction",
-          [](Clearance& self, const BoxContact& contact, double normal, const OneState& start,
-             double v, double w, double duration, const Obstacles& obstacles) {
-            return self.free_fraction(contact, normal, state_of(start), {v, w}, duration,
-                                      obstacles);
-          },
-          "contact"_a, "normal"_a, "start"_a.noconvert(), "v"_a, "w"_a, "duration"_a, "obstacles"_a,
-          ReleaseGil());
+          "contact"_a, "normal"_a, "state"_a.noconvert(), "obstacles"_a, ReleaseGil());
 }
 
 void bind_problem(nb::module_& module) {
@@ -202,66 +195,74 @@ void bind_problem(nb::module_& module) {
           ReleaseGil());
 }
 
-/// Faces with contacts of their own.
-struct ListedFaces {
-  std::vector<BoxContact> contacts;
-  Faces faces;
-};
-
 void bind_tracker(nb::module_& module) {
-  nb::class_<ListedFaces>(module, "Faces", "The sides of a box on one bumper.")
+  nb::class_<Face>(module, "Face", "A side of a box on the bumper.")
       .def(
           "__init__",
-          [](ListedFaces* self, const Floats<2>& scores, std::vector<BoxContact> contacts,
-             const Floats<1>& normals, const Floats<1>& curvatures) {
-            require_count("scores", scores.shape(0), contacts.size());
-            require_count("normals", normals.shape(0), contacts.size());
-            require_count("curvatures", curvatures.shape(0), contacts.size());
-            new (self) ListedFaces{std::move(contacts), {}};
-            self->faces = {rows_as<const FaceScore>(scores), self->contacts, view(normals),
-                           view(curvatures)};
+          [](Face* self, const Numbers<3>& score, const BoxContact& contact, double normal,
+             double curvature) {
+            const double* numbers = score.data();
+            new (self) Face{{numbers[0], numbers[1], numbers[2]}, contact, normal, curvature};
           },
-          "scores"_a.noconvert(), "contacts"_a, "normals"_a.noconvert(), "curvatures"_a.noconvert(),
-          nb::keep_alive<1, 2>(), nb::keep_alive<1, 4>(), nb::keep_alive<1, 5>());
-  nb::class_<PushTracker>(module, "PushTracker", "Pushes one box along one path.")
+          "score"_a.noconvert(), "contact"_a, "normal"_a, "curvature"_a);
+  nb::class_<PushTracker>(module, "PushTracker", "Pushes boxes along paths.")
       .def(
           "__init__",
-          [](PushTracker* self, const mpc::Horizon& horizon, const PushWeights& weights,
-             const ListedFaces& listed, const Clearance& clearance, const Integers<1>& groups,
-             double reach, double delay, double gain) {
-            new (self) PushTracker(horizon, {weights, view(groups), reach, delay, gain},
-                                   listed.faces, clearance);
+          [](PushTracker* self, const mpc::CommandLimits& limits, const PushWeights& weights,
+             const mpc::SolverSettings& solver, const Integers<1>& groups, double reach,
+             double delay, double gain, double v, double w) {
+            const std::span<const Index> listed = view(groups);
+            require_between("groups", static_cast<Index>(listed.size()), 2, kMostSteps);
+            require_between("groups", listed[0], 0, 0);
+            for (std::size_t k = 1; k < listed.size(); ++k) {
+              require_between("groups", listed[k], listed[k - 1], listed[k - 1] + 1);
+            }
+            require_between("groups", listed.back(), 1, kMostSteps);
+            new (self) PushTracker(
+                limits, {weights, {listed.begin(), listed.end()}, reach, delay, gain}, solver,
+                {v, w});
           },
-          "horizon"_a, "weights"_a, "faces"_a, "clearance"_a, "groups"_a.noconvert(), "reach"_a,
-          "delay"_a, "gain"_a, nb::keep_alive<1, 2>(), nb::keep_alive<1, 4>(),
-          nb::keep_alive<1, 5>(), nb::keep_alive<1, 6>())
-      .def("begin", &PushTracker::begin, "direction"_a)
+          "limits"_a, "weights"_a, "solver"_a, "groups"_a.noconvert(), "reach"_a, "delay"_a,
+          "gain"_a, "v"_a, "w"_a)
       .def(
-          "observe",
-          [](PushTracker& self, const mpc::ReferencePath& track, const OnePose& robot,
-             const OnePose& box, double time,
-             double held) { return self.observe(track, pose(robot), pose(box), time, held); },
-          "track"_a, "robot"_a.noconvert(), "box"_a.noconvert(), "time"_a, "held"_a, ReleaseGil())
-      .def("assemble", &PushTracker::assemble, "track"_a, "held"_a, ReleaseGil())
+          "begin",
+          [](PushTracker& self, std::vector<Face> faces, const Clearance& clearance,
+             double direction) {
+            require_room("faces", faces.size(), 1);
+            self.begin(std::move(faces), clearance, direction);
+          },
+          "faces"_a, "clearance"_a, "direction"_a)
       .def(
-          "drive",
-          [](PushTracker& self, const Obstacles& obstacles, bool solved, double time, double held) {
-            const Twist twist = self.drive(obstacles, solved, time, held);
+          "follow",
+          [](PushTracker& self, const mpc::ReferencePath& track, const Obstacles& obstacles,
+             const OnePose& robot, const OnePose& box, double time, double held) {
+            if (!self.has_begun()) throw Refusal("begin a path before it is followed");
+            const Twist twist = self.follow(track, obstacles, pose(robot), pose(box), time, held);
             return std::pair{twist.v, twist.w};
           },
-          "obstacles"_a, "solved"_a, "time"_a, "held"_a, ReleaseGil())
+          "track"_a, "obstacles"_a, "robot"_a.noconvert(), "box"_a.noconvert(), "time"_a, "held"_a,
+          ReleaseGil(), "The command; a stop at the end, and for poses that are not finite.")
       .def(
-          "send",
-          [](PushTracker& self, double v, double w, double time, double held) {
-            const Twist twist = self.send({v, w}, time, held);
+          "stop",
+          [](PushTracker& self, double time, double held) {
+            const Twist twist = self.stop(time, held);
             return std::pair{twist.v, twist.w};
           },
-          "v"_a, "w"_a, "time"_a, "held"_a)
+          "time"_a, "held"_a)
+      .def_prop_ro("failures", [](PushTracker& self) { return self.horizon().failed; })
+      .def_prop_ro(
+          "solution",
+          [](PushTracker& self) {
+            return copied_rows<double>(std::span<const Twist>(self.horizon().solution));
+          },
+          kOwned)
+      .def_prop_ro(
+          "steps",
+          [](PushTracker& self) { return copied(std::span<const double>(self.horizon().steps)); },
+          kOwned)
       .def_prop_ro("face", &PushTracker::face)
       .def_prop_ro("along", &PushTracker::along)
-      .def_prop_ro("lateral", &PushTracker::lateral)
       .def_prop_ro("slowed", &PushTracker::slowed)
-      .def_prop_ro("value", &PushTracker::value)
       .def_prop_ro(
           "state", [](const PushTracker& self) { return copied_state(self.state()); }, kOwned)
       .def_prop_ro(

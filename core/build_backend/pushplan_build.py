@@ -3,16 +3,21 @@
 Hooks of PEP 517 and PEP 660. Where no C++ compiler is found, the wheel ``ziglang`` becomes a build
 requirement, and scripts in the temporary folder call it by the names that CMake looks for.
 ``CXX=zig`` asks for it: such a wheel runs with an older C library than that of the machine.
+
+The wheel ``osqp`` is a build requirement too, for the C sources in it. They are kept in ``build``:
+the wheel brings NumPy and SciPy along, which a second installation should not wait for.
 """
 
 from __future__ import annotations
 
 import os
 import platform
+import shlex
 import shutil
 import stat
 import sys
 import tempfile
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +25,8 @@ from scikit_build_core import build as _build
 
 _COMPILERS = ("c++", "g++", "clang++")
 _TARGET = f"{platform.machine()}-linux-gnu.2.28"  # the oldest C library of the dependencies' wheels
-_TOOLS = {"CXX": "c++", "AR": "ar", "RANLIB": "ranlib"}
+_TOOLS = {"CC": "cc", "CXX": "c++", "AR": "ar", "RANLIB": "ranlib"}
+_OSQP = Path("build", "osqp")  # its package, as far as the core needs it
 
 
 def _needs_zig() -> bool:
@@ -31,12 +37,18 @@ def _needs_zig() -> bool:
 
 
 def _requirements(ask: Any, settings: dict[str, Any] | None) -> list[str]:
-    return [*ask(settings), *(["ziglang>=0.13"] if _needs_zig() else [])]
+    needed = list(ask(settings))
+    if _needs_zig():
+        needed.append("ziglang>=0.13")
+    if not _OSQP.is_dir():
+        needed.append("osqp>=1.1,<1.2")
+    return needed
 
 
 def _with_compiler(build: Any, *arguments: Any) -> str:
     if _needs_zig():
         _use_zig()
+    _keep_osqp()
     return str(build(*arguments))
 
 
@@ -45,18 +57,38 @@ def _use_zig() -> None:
     folder = Path(tempfile.mkdtemp(prefix="pushplan-zig-"))
     for variable, tool in _TOOLS.items():
         script = folder / tool
-        options = f" -target {_TARGET}" if tool == "c++" else ""
+        options = f" -target {_TARGET}" if tool in ("cc", "c++") else ""
         script.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m ziglang {tool}{options} "$@"\n')
         script.chmod(script.stat().st_mode | stat.S_IXUSR)
         os.environ[variable] = str(script)
-    os.environ["CMAKE_ARGS"] = " ".join(
-        [
-            os.environ.get("CMAKE_ARGS", ""),
-            f"-DCMAKE_AR={folder / 'ar'}",
-            f"-DCMAKE_RANLIB={folder / 'ranlib'}",
-            "-DCMAKE_CXX_SCAN_FOR_MODULES=OFF",
-        ]
-    ).strip()
+    _ask_cmake(
+        f"-DCMAKE_AR={folder / 'ar'}",
+        f"-DCMAKE_RANLIB={folder / 'ranlib'}",
+        "-DCMAKE_CXX_SCAN_FOR_MODULES=OFF",
+    )
+
+
+def _keep_osqp() -> None:
+    """Copy OSQP's sources and licence out of its package, and name the place to CMake."""
+    if not _OSQP.is_dir():
+        try:
+            package = metadata.distribution("osqp")
+        except metadata.PackageNotFoundError:  # CMake says what to do
+            return
+        partial = _OSQP.with_name("osqp.partial")
+        shutil.rmtree(partial, ignore_errors=True)
+        for file in package.files or []:
+            if "codegen_src" in file.parts or "licenses" in file.parts:
+                target = partial / file
+                target.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy2(file.locate(), target)
+        partial.rename(_OSQP)
+    _ask_cmake(f"-DPUSHPLAN_OSQP={_OSQP.resolve() / 'osqp'}")
+
+
+def _ask_cmake(*arguments: str) -> None:
+    quoted = map(shlex.quote, arguments)
+    os.environ["CMAKE_ARGS"] = " ".join([os.environ.get("CMAKE_ARGS", ""), *quoted]).strip()
 
 
 def get_requires_for_build_wheel(settings: dict[str, Any] | None = None) -> list[str]:

@@ -5,10 +5,11 @@
 #include <limits>
 #include <memory>
 
+#include "allocations.hpp"
 #include "check.hpp"
 #include "pushplan/planners/mppi/rollout.hpp"
 #include "pushplan/planners/push_aware/cost_to_go.hpp"
-#include "pushplan/planners/pushing/box_motion.hpp"
+#include "pushplan/planners/pushing/push_tracker.hpp"
 #include "pushplan/planners/rearrangement/controller.hpp"
 #include "pushplan/planners/rearrangement/goal.hpp"
 #include "pushplan/planners/rearrangement/pose_search.hpp"
@@ -43,6 +44,77 @@ void boxes_stay_on_the_bumper() {
     pushing::advance(contact, start, twist, 0.2);
     CHECK(start.gap > -1e-3 && std::isfinite(start.offset + start.angle));
   }
+}
+
+/// A robot that pushes a box along a straight path, with a wall beside it.
+struct Push {
+  Push() {
+    for (int i = 0; i < 41; ++i) {
+      poses.push_back({0.5 + 0.1 * i, 0.0, 0.0});
+      lengths.push_back(0.1 * i);
+      speeds.push_back(0.5);
+    }
+    const std::vector<double> radii{0.45, 0.3};
+    tracker.begin({{{1.0, 0.0, 0.0}, contact, 0.0, -1.0}},
+                  {bodies.polygons(), radii, {0.02, 1e-6}}, 0.0);
+  }
+
+  /// The command of a step, without its motion; the robot is lost if it is not `seen`.
+  pushing::Twist command(int step, bool seen = true) {
+    const Pose robot = seen ? state.robot : Pose{std::nan(""), 0.0, 0.0};
+    return tracker.follow({poses, lengths, speeds}, {walls.polygons(), radii_of_walls, walls.boxes},
+                          robot, pushing::box_pose(contact, state), 0.2 * step, 0.2);
+  }
+  void drive(int step) { pushing::advance(contact, state, command(step), 0.2); }
+
+  pushing::BoxContact contact{0.3, 0.25, 0.0, 0.2, -0.2, 0.2, 0.12, 0.4};
+  pushing::PushState state{{0.0, 0.0, 0.0}, 0.03, 0.0, 0.0};
+  std::vector<Pose> poses;
+  std::vector<double> lengths;
+  std::vector<double> speeds;
+  Shapes bodies{{rectangle(-0.3, -0.3, 0.3, 0.3), rectangle(-0.2, -0.2, 0.2, 0.2)}};
+  Shapes walls{{rectangle(0.0, 1.0, 5.0, 1.2)}};
+  std::vector<double> radii_of_walls{0.0};
+  pushing::PushTracker tracker{
+      {false, 0.0, 0.5, 1.0, 1.0, 4.0, 0.0},
+      {{0.0, 0.5, 0.0, -1.0, 0.2, 0.02, 4.0, 0.6, 0.1, 0.03, 0.02, 1.0, 0.01, 3.0},
+       {0, 1, 2, 3, 3, 4, 4, 5, 5, 5},
+       3.0,
+       0.0,
+       1.0},
+      {1e-5, 1000, 1, 4},
+      {0.0, 0.0}};
+};
+
+/// The box gets along its path and the robot stops; no command allocates.
+void pushes_follow_the_path() {
+  Push push;
+  for (int step = 0; step < 60; ++step) {
+    CHECK(!allocates([&] { push.drive(step); }));
+    CHECK(std::abs(pushing::box_pose(push.contact, push.state).y) < 0.05);
+  }
+  CHECK(near_to(push.tracker.along(), 4.0, 1e-6) && push.tracker.horizon().failed == 0);
+  CHECK(push.tracker.horizon().last.v == 0.0);
+}
+
+/// While the solver fails the last solution is driven on, until it has run out.
+void failing_pushes_stop() {
+  Push push;
+  for (int step = 0; step < 5; ++step) push.drive(step);
+  mpc::Horizon& horizon = push.tracker.horizon();
+  horizon.program = mpc::QuadraticProgram(12, 6, {0, 6}, {1e-300, 1, 1, 1});
+  CHECK(push.command(5).v > 0.2);
+  for (int step = 6; step < 30; ++step) push.command(step);
+  CHECK(horizon.failed == 25 && horizon.last.v == 0.0);
+}
+
+/// A robot or a box without a pose is not pushed on.
+void lost_pushes_stop() {
+  Push push;
+  for (int step = 0; step < 5; ++step) push.drive(step);
+  for (int step = 5; step < 10; ++step) push.command(step, false);
+  CHECK(push.tracker.horizon().last.v == 0.0 && push.tracker.horizon().last.w == 0.0);
+  CHECK(push.command(10).v > 0.1);
 }
 
 /// Rollouts keep to the limits, and stop where they are blocked or in the goal.
@@ -94,19 +166,25 @@ void rollouts_keep_to_limits() {
   CHECK(seen[0] > 0 && seen[1] + seen[2] > 0);
 }
 
-/// Floods are never shorter than straight lines, nor longer than the detour of a grid.
-void floods_measure_lengths() {
-  const auto open = std::make_unique<bool[]>(400);
-  std::fill_n(open.get(), 400, true);
-  const Cells cells{{0.0, 0.0}, 0.5};
-  const GoalRegion goal{GoalRegion::Kind::kDisc, {5.25, 5.25}, {}, 0.1};
-  const Flood found = flood({open.get(), {20, 20}}, cells, goal, -1);
-  CHECK(found.order.size() == 400 && found.lengths[10 * 20 + 10] == 0.0);
-  for (Index at = 0; at < 400; ++at) {
-    const Vec2 centre = cells.centre(at / 20, at % 20);
-    const double straight = std::hypot(centre.x - 5.25, centre.y - 5.25);
-    const double length = found.lengths[static_cast<std::size_t>(at)];
-    CHECK(length >= straight - 1e-9 && length <= 1.09 * straight + 1e-9);
+/// The floor of a table is never shorter than a straight line, nor longer than the detour of a grid,
+/// and no length to go is shorter than it.
+void tables_measure_lengths() {
+  const std::vector<Vec2> corners = tests::rectangle(-0.2, -0.2, 0.2, 0.2);
+  const std::vector<Index> offsets{0, 4};
+  const std::vector<Index> none{0};
+  const ConvexObstacles walls{{{}, none}, {}, {}, {0.0, 0.0, 10.0, 10.0}};
+  const GoalRegion goal{GoalRegion::Kind::kDisc, {5.0, 5.0}, {}, 0.1};
+  CostToGoMaker maker({{corners, offsets}, 0.3}, walls, goal, 0.3, 0.5);
+  while (!maker.done()) maker.step();
+  const CostToGo table = maker.table();
+  CHECK(maker.useful() && maker.flooded());
+  for (Index at = 0; at < table.floor.size(); ++at) {
+    const Vec2 centre = table.cells.centre(at / table.columns(), at % table.columns());
+    const double straight = std::hypot(centre.x - 5.0, centre.y - 5.0);
+    const double floor = table.floor.data()[at];
+    if (centre.x > 10.0 || centre.y > 10.0) continue;  // out of the bounds
+    CHECK(floor >= straight - 0.1 && floor <= 1.09 * straight + 0.1);
+    CHECK(table.length_to_go({centre.x, centre.y, 1.0}) >= straight - 0.2);
   }
 }
 
@@ -259,8 +337,11 @@ void changes_join_the_path() {
 
 int main() {
   pushplan::boxes_stay_on_the_bumper();
+  pushplan::pushes_follow_the_path();
+  pushplan::failing_pushes_stop();
+  pushplan::lost_pushes_stop();
   pushplan::rollouts_keep_to_limits();
-  pushplan::floods_measure_lengths();
+  pushplan::tables_measure_lengths();
   pushplan::pose_searches_are_exact();
   pushplan::goals_and_carrots_are_where_they_are();
   pushplan::ice_adds_to_the_cost_to_go();

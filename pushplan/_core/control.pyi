@@ -11,14 +11,18 @@ import pushplan._core.motion
 class CommandLimits:
     def __init__(self, constant: bool, min_speed: float, max_speed: float, max_turn_rate: float, max_acceleration: float, max_turn_acceleration: float, turning_radius: float) -> None: ...
 
-class Horizon:
-    """Commands for the next steps, in arrays of Python."""
+class SolverSettings:
+    def __init__(self, tolerance: float, iterations: int, rounds: int, first_rounds: int) -> None: ...
 
-    def __init__(self, limits: CommandLimits, units: Annotated[NDArray[numpy.float64], dict(shape=(2), order='C', device='cpu', writable=False)], columns: Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C', device='cpu', writable=False)], moves: int, blocks: Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C', device='cpu', writable=False)], hessian: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu')], gradient: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')], low: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')], high: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')], x: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')], steps: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')], solved: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')], shifted: Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C', device='cpu')], solution: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu')], nominal: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu')], last: Annotated[NDArray[numpy.float64], dict(shape=(2), order='C', device='cpu')], sent: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu')], counts: Annotated[NDArray[numpy.int64], dict(shape=(4), order='C', device='cpu')]) -> None: ...
+class QuadraticProgram:
+    """A quadratic program over commands, and its solver."""
 
-    def send(self, v: float, w: float, held: float, ramps: bool) -> tuple[float, float]: ...
+    def __init__(self, variables: int, moves: int, blocks: Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C', device='cpu', writable=False)], settings: SolverSettings) -> None: ...
 
-    def remember(self, time: float, over: float) -> None: ...
+    def solve(self, hessian: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], gradient: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], low: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], high: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], x: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> bool:
+        """
+        Minimise from x, in place; False if OSQP does not call its answer solved.
+        """
 
 class ReferencePath:
     def __init__(self, poses: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu', writable=False)], lengths: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], speeds: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> None: ...
@@ -40,18 +44,14 @@ class TrackingAssembly:
 class Tracker:
     """A predictive tracker of one robot."""
 
-    def __init__(self, horizon: Horizon, tuning: Tuning, span: float, delay: float) -> None: ...
+    def __init__(self, limits: CommandLimits, tuning: Tuning, solver: SolverSettings, steps: int, span: float, delay: float, v: float, w: float) -> None: ...
 
     def begin_track(self) -> None: ...
 
-    def begin_step(self, track: ReferencePath, pose: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], time: float, held: float) -> tuple[float, float] | None:
-        """
-        Put up the program for where the robot is; the command where it is known without one.
-        """
+    def follow(self, track: ReferencePath, pose: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], time: float, held: float) -> tuple[float, float]:
+        """The command for where the robot is; a stop where that is not finite."""
 
-    def assemble_step(self, track: ReferencePath) -> None: ...
-
-    def finish_step(self, track: ReferencePath, pose: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], time: float, held: float, solved: bool) -> tuple[float, float]:
-        """The command: of the solution, or what is nearest to it without one."""
+    @property
+    def failures(self) -> int: ...
 
 def clear_steps(step: float, turn: float, first: int, most: int, shape: pushplan._core.motion.Footprint, walls: pushplan._core.motion.ConvexObstacles, at: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)]) -> int: ...

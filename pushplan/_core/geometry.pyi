@@ -159,13 +159,6 @@ class ObstacleGrid:
     @property
     def items(self) -> Annotated[NDArray[numpy.int64], dict(shape=(None,))]: ...
 
-class GridSight:
-    """Tests of sight with memory for one thread."""
-
-    def __init__(self, grid: ObstacleGrid) -> None: ...
-
-    def sees(self, px: float, py: float, qx: float, qy: float, margin: float) -> bool: ...
-
 class Corners:
     """Corners by obstacle, then ends on the goal's rim."""
 
@@ -187,9 +180,6 @@ class VisibilitySearch:
 
     @property
     def end(self) -> int: ...
-
-    @property
-    def lines_tested(self) -> int: ...
 
     @property
     def parents(self) -> Annotated[NDArray[numpy.int64], dict(shape=(None,))]: ...

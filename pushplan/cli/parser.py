@@ -64,6 +64,20 @@ class CommandParser(argparse.ArgumentParser):
             raise argparse.ArgumentError(None if kind == "command" else action, text)
 
 
+class _PrintCmakeDir(argparse.Action):
+    """Prints the folder of the CMake package, and ends."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> NoReturn:
+        from pushplan.core import cmake_dir
+        from pushplan.errors import PushplanError
+
+        try:
+            print(cmake_dir())
+        except PushplanError as error:
+            sys.exit(fail(str(error), 1))
+        sys.exit(0)
+
+
 def fail(message: str, code: int) -> int:
     """Say on one line why a command ends, and give its exit code."""
     from pushplan.errors import one_line
@@ -81,6 +95,12 @@ def build_parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"pushplan {__version__}")
+    parser.add_argument(
+        "--cmake-dir",
+        action=_PrintCmakeDir,
+        nargs=0,
+        help="print the folder for CMake's find_package(pushplan) and exit",
+    )
     text = files("pushplan.cli").joinpath("commands.toml").read_text(encoding="utf-8")
     described = tomllib.loads(text)
     shared = described.pop("shared")

@@ -11,8 +11,7 @@ from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.swept_path import SweptPath
 from pushplan.world import Drive, GoalDisc, InvalidInputError, Plan, RobotModel, World
-from pushplan.world.checks import BoolArray, FloatArray
-from pushplan.world.polyline import goes_back
+from pushplan.world.checks import FloatArray
 
 TIGHTEST = 0.1
 """Least turning radius that plans ever use, in circumscribed radii: nearly on the spot."""
@@ -84,7 +83,7 @@ def timed_plan(
     """Give a path speeds and times: full speed, slower where curvature or accelerations ask for it.
 
     Steps against the heading are driven back; those of infinite curvature turn on the spot. A
-    constant-speed robot drives at its speed.
+    constant-speed robot drives at its speed. The plan begins with the robot's twist.
 
     Args:
         world: the snapshot that the path starts from.
@@ -94,90 +93,29 @@ def timed_plan(
     """
     robot = world.robot
     count = len(path.poses)
-    ahead = np.append(path.curvatures[1:], 0.0)  # curvature from each pose on
-    on_spot = np.isinf(ahead)
-    signs = np.sign(ahead)
-    ahead[on_spot] = 0.0
-    speeds = robot.max_speed * np.ones(count)
-    turn_rate = turn_fraction * robot.max_turn_rate
-    back = goes_back(path.poses, robot.circumscribed_radius)
-    back &= robot.min_speed < 0.0
-    speeds[back] = robot.min_speed
-    if robot.can_stop:
-        fastest = turn_rate / np.maximum(np.abs(ahead), 1e-12)
-        speeds = np.clip(speeds, -fastest, fastest)
-    extents = along_arcs(np.diff(path.lengths) if chords is None else chords, ahead[:-1])
-    spot = on_spot[:-1]
-    extents[spot] = np.abs(np.diff(path.poses[:, 2])[spot])
-    rates = np.where(on_spot, signs * turn_rate, speeds)
-    if robot.can_stop:
-        rates[:-1] = _eased(world, rates[:-1], extents, ahead[:-1], spot)
-    speeds = np.where(on_spot, 0.0, rates)
-    times = np.concatenate([[0.0], np.cumsum(extents / np.abs(rates[:-1]))])
+    assert world.robot_twist is not None
+    vx, vy, omega = (float(value) for value in world.robot_twist)
+    theta = float(world.robot_pose[2])
+    limits = core.SpeedLimits(
+        size=robot.circumscribed_radius,
+        max_speed=robot.max_speed,
+        min_speed=robot.min_speed,
+        turn_rate=turn_fraction * robot.max_turn_rate,
+        max_acceleration=robot.max_acceleration,
+        max_turn_acceleration=robot.max_turn_acceleration,
+        can_stop=robot.can_stop,
+        driven_speed=vx * math.cos(theta) + vy * math.sin(theta),
+        driven_turn_rate=omega,
+    )
+    times, speeds, turn_rates = np.empty((3, count))
+    chords = np.diff(path.lengths) if chords is None else chords
+    core.fill_speed_profile(path.poses, path.curvatures, chords, limits, times, speeds, turn_rates)
     return Plan(
         times=times,
         poses=path.poses,
         speeds=speeds,
-        turn_rates=np.where(on_spot, rates, speeds * ahead),
+        turn_rates=turn_rates,
         travel_cost=robot.mass * float(path.lengths[-1]),
         interaction_cost=float(path.works[-1]),
         object_poses=path.objects,
     )
-
-
-def _eased(
-    world: World, rates: FloatArray, extents: FloatArray, curvatures: FloatArray, spot: BoolArray
-) -> FloatArray:
-    """Slow down where a step would change speed or turn rate faster than the robot can.
-
-    A change between two steps takes half the time of both. Where direction or kind of motion
-    changes, each step takes its half of that. The plan begins with the robot's twist, if known.
-
-    Args:
-        world: gives the robot.
-        rates: (N,) speed of each step [m/s], or turn rate on the spot [rad/s].
-        extents: (N,) length [m], or angle [rad].
-        curvatures: (N,) curvature [1/m].
-        spot: (N,) which steps turn on the spot.
-
-    Returns:
-        (N,) the rates, none faster.
-    """
-    robot = world.robot
-    turning = robot.max_turn_acceleration
-    if (math.isinf(robot.max_acceleration) and math.isinf(turning)) or not len(rates):
-        return rates
-    # half of the turn acceleration is for changes of speed on an arc, half for changes of curvature
-    most = np.minimum(robot.max_acceleration, 0.5 * turning / np.maximum(np.abs(curvatures), 1e-12))
-    most[spot] = turning
-    limits = np.abs(rates)
-    between = 0.5 * (extents[1:] + extents[:-1])
-    changes = np.maximum(np.abs(np.diff(curvatures)), 1e-12)
-    allowed = np.sqrt(0.5 * turning * between / changes)
-    limits[1:] = np.minimum(limits[1:], allowed)
-    limits[:-1] = np.minimum(limits[:-1], allowed)
-    parted = (np.sign(rates[1:]) != np.sign(rates[:-1])) | (spot[1:] != spot[:-1])
-    alone = np.sqrt(0.5 * most * extents)
-    limits[1:][parted] = np.minimum(limits[1:], alone[1:])[parted]
-    limits[:-1][parted] = np.minimum(limits[:-1], alone[:-1])[parted]
-    gains = np.where(parted, math.inf, np.minimum(most[1:], most[:-1]) * between)
-    if world.robot_twist is not None:
-        vx, vy, omega = (float(value) for value in world.robot_twist)
-        theta = float(world.robot_pose[2])
-        now = vx * math.cos(theta) + vy * math.sin(theta)
-        if spot[0]:
-            now = omega
-        now = max(now * float(np.sign(rates[0])), 0.0)
-        limits[0] = min(limits[0], _after(now, 0.5 * most[0] * extents[0]))
-    found = limits.tolist()
-    steps = [(i, i + 1) for i in range(len(gains))]
-    for before, after in (*steps, *((after, before) for before, after in reversed(steps))):
-        gain = gains[min(before, after)]
-        found[after] = min(found[after], _after(found[before], gain))
-    eased: FloatArray = np.copysign(found, rates)
-    return eased
-
-
-def _after(rate: float, gain: float) -> float:
-    """The rate of a step after one of ``rate``; ``gain`` is acceleration times distance."""
-    return 0.5 * (rate + math.sqrt(rate * rate + 4.0 * gain))

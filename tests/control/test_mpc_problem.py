@@ -7,13 +7,14 @@ from types import SimpleNamespace
 
 import casadi
 import numpy as np
+import osqp
 import pytest
 from conftest import make_robot, make_u_maze
 from scipy.optimize import minimize
+from scipy.sparse import csc_matrix
 from test_tracking_controllers import FLOOR, arc_plan
 
 from pushplan.control import MpcConfig, MpcTracker
-from pushplan.control.mpc.quadratic_program import ProgramSolver, quadratic_program
 from pushplan.core import control as core
 
 CURVATURE = 0.4
@@ -164,17 +165,61 @@ def random_problem(rng, blocks: int, horizon: int):
 
 
 class Program:
-    """`ProgramSolver` with arrays in and out."""
+    """`QuadraticProgram` of the core with the solution out."""
 
     def __init__(self, blocks, horizon, tolerance=1e-6):
-        self.memory = quadratic_program(blocks * horizon, horizon, np.arange(blocks) * horizon)
-        self.solver = ProgramSolver(self.memory, tolerance, 2000)
+        settings = core.SolverSettings(tolerance, 2000, 1, 1)
+        firsts = np.arange(blocks) * horizon
+        self.core = core.QuadraticProgram(blocks * horizon, horizon, firsts, settings)
 
     def solve(self, hessian, gradient, low, high, start):
-        memory = self.memory
-        memory.hessian[:], memory.gradient[:] = hessian, gradient
-        memory.low[:], memory.high[:], memory.x[:] = low, high, start
-        return memory.x.copy() if self.solver.solve() else None
+        x = start.copy()
+        return x if self.core.solve(hessian, gradient, low, high, x) else None
+
+
+class ProgramOfOsqp:
+    """The same program for OSQP's package, set up and updated in the same way."""
+
+    def __init__(self, blocks, horizon, tolerance=1e-6):
+        n = blocks * horizon
+        change = np.kron(np.eye(blocks), np.eye(horizon) - np.eye(horizon, k=-1))
+        self.upper = np.tril_indices(n)[::-1]
+        self.solver = osqp.OSQP()
+        self.solver.setup(
+            csc_matrix((np.ones(len(self.upper[0])), self.upper), shape=(n, n)),
+            np.zeros(n),
+            csc_matrix(np.vstack([np.eye(n), change])),
+            -np.ones(2 * n),
+            np.ones(2 * n),
+            eps_abs=tolerance,
+            eps_rel=tolerance,
+            max_iter=2000,
+            scaling=0,
+            adaptive_rho_interval=20,
+            check_termination=5,
+            verbose=False,
+        )
+
+    def solve(self, hessian, gradient, low, high, start):
+        scale = len(gradient) / float(np.trace(hessian))
+        self.solver.update(q=scale * gradient, l=low, u=high, Px=scale * hessian[self.upper])
+        self.solver.warm_start(x=start)
+        return self.solver.solve(raise_error=False).x
+
+
+@pytest.mark.parametrize(("blocks", "horizon"), [(1, 20), (2, 10), (2, 20)])
+def test_the_solver_is_osqp(blocks, horizon):
+    """Step for step: what takes other steps to the solution differs by the tolerance, 1e-6."""
+    rng = np.random.default_rng(blocks * horizon)
+    program = Program(blocks, horizon)
+    reference = ProgramOfOsqp(blocks, horizon)
+    start = np.zeros(blocks * horizon)
+    for _ in range(20):
+        problem = random_problem(rng, blocks, horizon)
+        found = program.solve(*problem, start)
+        expected = reference.solve(*problem, start)
+        assert found == pytest.approx(expected, abs=1e-12)
+        start = found
 
 
 @pytest.mark.parametrize("blocks", [1, 2])

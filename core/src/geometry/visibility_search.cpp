@@ -133,7 +133,6 @@ VisibilitySearch::Outcome VisibilitySearch::run(Index budget) {
     }
     const std::size_t node = at(entry.node);
     if (done_[node]) continue;
-    ++lines_tested_;
     budget -= kLineWork;
     if (!sight_.sees(place(entry.before), corners_.points[node], scene_.gap)) continue;
     done_[node] = 1;

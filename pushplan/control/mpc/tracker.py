@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import partial
 
 from pushplan.control.limits import driven_twist
-from pushplan.control.mpc.horizon import Horizon, make_horizon, solve_rounds, track_of
+from pushplan.control.mpc.inputs import limits_of, track_of
 from pushplan.control.mpc.mpc_config import MpcConfig
-from pushplan.control.mpc.quadratic_program import ProgramSolver
 from pushplan.control.staged_controller import StagedController
 from pushplan.core import control as core
 from pushplan.world import Drive, Plan, RobotModel, Twist, World
@@ -40,17 +38,17 @@ class MpcTracker(StagedController):
         self._robot: RobotModel | None = None
         self._plan: Plan | None = None
         self._hold_commands(self.config.period)
-        self._horizon: Horizon | None = None
-        self._earlier = 0  # failures of horizons before
+        self._tracker: core.Tracker | None = None
+        self._earlier = 0  # failures of trackers before
 
     @property
     def fallbacks(self) -> int:
         """Calls since the start of the episode in which the solver gave no solution."""
-        return self._earlier + (self._horizon.failures if self._horizon else 0)
+        return self._earlier + (self._tracker.failures if self._tracker else 0)
 
     def reset(self, world: World) -> None:
         """See `pushplan.world.Controller`."""
-        self._horizon = None
+        self._tracker = None
         self._earlier = 0
         super().reset(world)
 
@@ -61,27 +59,13 @@ class MpcTracker(StagedController):
         """Start afresh in a new episode, on a new plan, or where the robot is another one."""
         if self._robot is not world.robot and self._robot != world.robot:
             self._prepare(world)
-        horizon = self._horizon
         tracker = self._tracker
-        assert horizon is not None
+        assert tracker is not None
         if plan is not self._plan:
             self._plan = plan
             self._track = track_of(plan)
             tracker.begin_track()
-        pose = world.robot_pose
-        time = world.time
-        held = self._clock.held
-        known = tracker.begin_step(self._track, pose, time, held)
-        if known is not None:
-            return Twist(*known)
-        solved = solve_rounds(
-            horizon,
-            self._solver,
-            self.config.iterations,
-            self.config.first_iterations,
-            partial(tracker.assemble_step, self._track),
-        )
-        return Twist(*tracker.finish_step(self._track, pose, time, held, solved))
+        return Twist(*tracker.follow(self._track, world.robot_pose, world.time, self._clock.held))
 
     def _prepare(self, world: World) -> None:
         """Set up the problem of another robot."""
@@ -90,23 +74,22 @@ class MpcTracker(StagedController):
         self._robot = robot
         self._plan = None
         self._earlier = self.fallbacks
-        columns = (1, 0) if _optimises_speed(robot, config) else (1,)
-        self._horizon = make_horizon(robot, columns, config.horizon, config.horizon)
-        self._solver = ProgramSolver(
-            self._horizon.program, config.tolerance, config.solver_iterations
-        )
         driven = driven_twist(world)
-        self._horizon.last[:] = driven.linear, driven.angular
         self._tracker = core.Tracker(
-            self._horizon.core,
+            limits_of(robot),
             _tuning(robot, config),
+            core.SolverSettings(
+                config.tolerance,
+                config.solver_iterations,
+                config.iterations,
+                config.first_iterations,
+            ),
+            steps=config.horizon,
             span=config.reach * robot.circumscribed_radius / robot.max_speed,
             delay=config.delay,
+            v=driven.linear,
+            w=driven.angular,
         )
-
-
-def _optimises_speed(robot: RobotModel, config: MpcConfig) -> bool:
-    return config.optimise_speed and robot.drive is Drive.DIFFERENTIAL
 
 
 def _tuning(robot: RobotModel, config: MpcConfig) -> core.Tuning:
@@ -116,7 +99,7 @@ def _tuning(robot: RobotModel, config: MpcConfig) -> core.Tuning:
         max_turn_rate=robot.max_turn_rate,
         max_acceleration=robot.max_acceleration,
         stops=robot.can_stop,
-        optimise_speed=_optimises_speed(robot, config),
+        optimise_speed=config.optimise_speed and robot.drive is Drive.DIFFERENTIAL,
         heading_weight=config.heading_weight,
         turn_weight=config.turn_weight,
         smoothness=config.smoothness,

@@ -20,7 +20,7 @@ from pushplan.evaluation.store.rows import instant
 
 PACKAGES = (
     *("casadi", "gymnasium", "mujoco", "numpy", "ompl", "onnxruntime"),
-    *("osqp", "pymunk", "ruckig", "scipy", "shapely", "torch"),
+    *("pymunk", "ruckig", "scipy", "shapely", "torch"),
 )
 """Packages that results may depend on; those that are installed are named."""
 _ENGINES = ("mujoco", "pymunk")
@@ -106,7 +106,8 @@ def versions(simulator: str) -> dict[str, str]:
 
     Returns:
         ``python``, ``pushplan``, ``code`` (a hash of the package without `UNSEEN`), ``core`` (a
-        hash of the sources of the compiled core, and its compiler) and installed packages by name.
+        hash of the sources of the compiled core, its compiler, and the OSQP in it) and installed
+        packages by name.
     """
     others = {"torch", *_ENGINES} - {simulator}
     return {

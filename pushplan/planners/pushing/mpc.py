@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from functools import partial
 
 import numpy as np
 
 from pushplan.control.episode_clock import EpisodeClock
 from pushplan.control.limits import driven_twist
-from pushplan.control.mpc.horizon import Horizon, make_horizon, solve_rounds, track_of
-from pushplan.control.mpc.quadratic_program import ProgramSolver
+from pushplan.control.mpc.inputs import limits_of, track_of
+from pushplan.core import control
 from pushplan.core import pushing as core
 from pushplan.geometry.obstacles import obstacles_of
 from pushplan.planners.pushing.bumper import faces_of
@@ -48,7 +47,6 @@ class PushingMpc:
         expect("config", self.config, PushingConfig)
         self._robot: RobotModel | None = None
         self._plan: Plan | None = None
-        self._horizon: Horizon | None = None
         self._tracker: core.PushTracker | None = None
         self._clock = EpisodeClock(self.config.period)
         self._gone = True
@@ -56,29 +54,34 @@ class PushingMpc:
     @property
     def along(self) -> float:
         """Length of the path that the box has been pushed [m]."""
-        return math.nan if self._tracker is None else self._tracker.along
+        return math.nan if self._begun is None else self._begun.along
 
     @property
     def slowed(self) -> float:
         """Fraction of the last command that was driven, for the sake of what is static."""
-        return math.nan if self._tracker is None else self._tracker.slowed
+        return math.nan if self._begun is None else self._begun.slowed
 
     @property
     def fallbacks(self) -> int:
         """Calls since the start of the episode in which the solver gave no solution."""
-        return 0 if self._horizon is None else self._horizon.failures
+        return 0 if self._tracker is None else self._tracker.failures
 
     @property
     def model(self) -> PushModel | None:
         """Of the box that is pushed."""
-        return None if self._tracker is None else self._models[self._tracker.face]
+        return None if self._begun is None else self._models[self._begun.face]
 
     @property
     def state(self) -> PushState | None:
         """Robot and box as estimated at the last call; None if the box had gone."""
-        if self._tracker is None or self._gone:
+        if self._begun is None or self._gone:
             return None
-        return PushState.from_row(self._tracker.state)
+        return PushState.from_row(self._begun.state)
+
+    @property
+    def _begun(self) -> core.PushTracker | None:
+        """The tracker once it has a path."""
+        return None if self._plan is None else self._tracker
 
     def reset(self, world: World) -> None:
         """See `pushplan.world.Controller`."""
@@ -96,19 +99,26 @@ class PushingMpc:
         return self._clock.command_for(world, lambda _: self._follow(world, plan))
 
     def _follow(self, world: World, plan: Plan) -> Twist:
-        horizon = self._prepare(world, plan)
+        tracker = self._prepare(world, plan)
         found = np.flatnonzero(world.movables.ids == plan.subtasks[0].object_ids[0])
         self._gone = len(found) == 0
+        held = self._clock.held
         if self._gone:
-            sent = horizon.core.send(0.0, 0.0, self._clock.held, ramps=True)
-            horizon.core.remember(world.time, world.time - 2.0 * self.config.delay - 1.0)
-            return Twist(*sent)
+            return Twist(*tracker.stop(world.time, held))
         k = int(found[0])
         if plan is not self._plan:
             self._begin(world, plan, k)
-        return Twist(*self._step(world, world.robot_pose, world.movables.poses[k]))
+        command = tracker.follow(
+            self._track,
+            obstacles_of(world.static),
+            world.robot_pose,
+            world.movables.poses[k],
+            world.time,
+            held,
+        )
+        return Twist(*command)
 
-    def _prepare(self, world: World, plan: Plan) -> Horizon:
+    def _prepare(self, world: World, plan: Plan) -> core.PushTracker:
         """Start afresh where the episode or the robot has changed."""
         robot = world.robot
         config = self.config
@@ -118,49 +128,53 @@ class PushingMpc:
             raise InvalidInputError(
                 "the plan must name the box in its first sub-task, as PushPath.plan does"
             )
-        if self._horizon is None or (self._robot is not robot and self._robot != robot):
+        if self._tracker is None or (self._robot is not robot and self._robot != robot):
             self._robot = robot
             self._plan = None
-            self._tracker = None
-            self._horizon = make_horizon(robot, (0, 1), config.horizon, config.moves)
-            self._solver = ProgramSolver(
-                self._horizon.program, config.tolerance, config.solver_iterations
-            )
             driven = driven_twist(world)
-            self._horizon.last[:] = driven.linear, driven.angular
-        return self._horizon
+            weights = {name: getattr(config, name) for name in _WEIGHTS}
+            self._tracker = core.PushTracker(
+                limits_of(robot),
+                core.PushWeights(
+                    max_speed=robot.max_speed,
+                    safe=_SAFE_FRACTION,
+                    # these come with the face
+                    length=0.0,
+                    half=0.0,
+                    curvature=-1.0,
+                    **weights,
+                ),
+                control.SolverSettings(
+                    config.tolerance,
+                    config.solver_iterations,
+                    config.iterations,
+                    config.first_iterations,
+                ),
+                groups_of(config.horizon, config.moves),
+                config.reach,
+                config.delay,
+                gain=config.observer_gain,
+                v=driven.linear,
+                w=driven.angular,
+            )
+        return self._tracker
 
     def _begin(self, world: World, plan: Plan, k: int) -> None:
-        """A new path: which face is pushed, and the tracker of it."""
-        assert self._horizon is not None
+        """A new path: which face is pushed, and what is kept clear."""
+        assert self._tracker is not None
         outline = world.movables.outline(k)
         faces, scores = faces_of(convex_outline("outline", outline))
         parameters = self.config.parameters
         self._plan = plan
         self._track = track_of(plan)
         self._models = [PushModel(world.robot, outline, parameters, face) for face in faces]
-        self._tracker = _tracker(world.robot, self._models, scores, self.config, self._horizon)
-        self._tracker.begin(float(world.robot_pose[2] - world.movables.poses[k, 2]))
-
-    def _step(self, world: World, pose: FloatArray, box: FloatArray) -> tuple[float, float]:
-        """Speed [m/s] and turn rate [rad/s]."""
-        tracker = self._tracker
-        time = world.time
-        held = self._clock.held
-        assert tracker is not None
-        if not tracker.observe(self._track, pose, box, time, held):
-            return tracker.send(0.0, 0.0, time, held)
-        solved = self._solve(tracker)
-        return tracker.drive(obstacles_of(world.static), solved, time, held)
-
-    def _solve(self, tracker: core.PushTracker) -> bool:
-        assert self._horizon is not None
-        return solve_rounds(
-            self._horizon,
-            self._solver,
-            self.config.iterations,
-            self.config.first_iterations,
-            partial(tracker.assemble, self._track, self._clock.held),
+        self._tracker.begin(
+            [
+                _face(model, score, self.config)
+                for model, score in zip(self._models, scores, strict=True)
+            ],
+            _clearance(world.robot, self._models[0], self.config),
+            float(world.robot_pose[2] - world.movables.poses[k, 2]),
         )
 
 
@@ -172,53 +186,22 @@ def groups_of(horizon: int, moves: int) -> IntArray:
     return np.searchsorted(ends, np.arange(horizon), side="right").astype(np.int64)
 
 
-def _tracker(
-    robot: RobotModel,
-    models: list[PushModel],
-    scores: FloatArray,
-    config: PushingConfig,
-    horizon: Horizon,
-) -> core.PushTracker:
-    """The controller of one box.
+def _face(model: PushModel, score: FloatArray, config: PushingConfig) -> core.Face:
+    """A side of a box; ``score`` (3,) as `faces_of` gives it."""
+    stable = model.stable_curvature()
+    is_limited = stable * model.reach > 0.02
+    curvature = config.margin * stable if is_limited else -1.0
+    return core.Face(score, model.contact, model.face.normal, curvature)
 
-    Args:
-        robot: that pushes.
-        models: contact model of each face.
-        scores: (F, 3) of them, see `faces_of`.
-        config: parameters.
-        horizon: commands, which outlast a path.
-    """
+
+def _clearance(robot: RobotModel, model: PushModel, config: PushingConfig) -> core.Clearance:
     size = robot.circumscribed_radius
-    stable = [(model.stable_curvature(), model.reach) for model in models]
-    vertices, offsets = flatten([*robot.wall_parts, models[0].outline])
+    vertices, offsets = flatten([*robot.wall_parts, model.outline])
     far = np.hypot(vertices[:, 0], vertices[:, 1])
-    return core.PushTracker(
-        horizon.core,
-        core.PushWeights(
-            length=0.0,  # comes with the face, as the curvature does
-            max_speed=robot.max_speed,
-            half=models[0].bumper.half,
-            curvature=-1.0,
-            safe=_SAFE_FRACTION,
-            **{name: getattr(config, name) for name in _WEIGHTS},
-        ),
-        core.Faces(
-            scores,
-            [model.contact for model in models],
-            normals=np.array([model.face.normal for model in models]),
-            curvatures=np.array(
-                [config.margin * k if k * reach > 0.02 else -1.0 for k, reach in stable]
-            ),
-        ),
-        core.Clearance(
-            vertices,
-            offsets,
-            radii=np.maximum.reduceat(far, offsets[:-1]),
-            least=config.clearance * size,
-            slack=_NEARER * size,
-        ),
-        groups_of(config.horizon, config.moves),
-        config.reach,
-        config.delay,
-        gain=config.observer_gain,
+    return core.Clearance(
+        vertices,
+        offsets,
+        radii=np.maximum.reduceat(far, offsets[:-1]),
+        least=config.clearance * size,
+        slack=_NEARER * size,
     )

@@ -144,7 +144,7 @@ class PredictiveCall:
             objects = np.repeat(world.movables.poses[None], len(path), axis=0)
             objects[:, view.near] = view.to_world(self._objects)
         chords = step_lengths(path)
-        swept = bare_path(poses, path[:, 3])
+        swept = bare_path(poses, path[:, 3].copy())
         return replace(
             timed_plan(world, swept, self.beam.config.turn_fraction, chords),
             travel_cost=world.robot.mass * float(along_arcs(chords, path[1:, 3]).sum()),

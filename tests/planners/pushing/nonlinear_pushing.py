@@ -11,16 +11,16 @@ from typing import Any
 import casadi
 import numpy as np
 
-from pushplan.control.mpc.horizon import track_of
+from pushplan.control.mpc.inputs import track_of
 from pushplan.core import pushing as core
-from pushplan.geometry.obstacles import obstacles_of
 from pushplan.planners.pushing.mpc import _SAFE_FRACTION, _WEIGHTS, PushingMpc, groups_of
-from pushplan.world import RobotModel, World
+from pushplan.world import Plan, RobotModel, Twist, World
 from pushplan.world.checks import FloatArray, IntArray
 
 FLUSH = 1e-9  # angle below which a box counts as lying on the bumper [rad]
 SPEED_SMOOTHNESS = 0.1  # cost of a change of speed, against that of turn rate
 _MOST_OFFSET, _MOST_GAP = 1.5, 2.0  # that the problem is solved for [half bumpers, L]
+_LEAST_SPEED = 0.4  # of a push, as a fraction of the greatest
 _SUBSTEPS = 2
 _ROUNDS = 3  # how often the box's places on the path are looked up again
 _SETTINGS: dict[str, Any] = {
@@ -37,35 +37,34 @@ _SETTINGS: dict[str, Any] = {
 
 
 class NonlinearPushingMpc(PushingMpc):
-    """`PushingMpc` whose problem is solved as it is, by an interior-point method.
+    """`PushingMpc` that also solves each problem as it is, by an interior-point method.
 
-    It starts from the solution of the quadratic program and keeps whichever costs less.
+    It starts from the solution of the quadratic program, which is what it drives.
     """
 
     _solver_of: tuple[Any, ...] | None = None
+    _sent = np.zeros(2)  # the command before
     gain: tuple[float, float] = (0.0, 0.0)
-    """Cost of the quadratic program's commands and of those found at the last call."""
+    """Cost of the quadratic program's commands, and of the best ones, at the last call."""
 
-    def _step(self, world: World, pose: FloatArray, box: FloatArray) -> tuple[float, float]:
-        tracker, nominal, held = self._tracker, self._horizon.nominal, self._clock.held
-        if not tracker.observe(self._track, pose, box, world.time, held):
-            return tracker.send(0.0, 0.0, world.time, held)
-        if not self._solve(tracker):
-            nominal[:] = [world.robot.max_speed, 0.0]
-        nominal[:] = self._refined(world.robot, nominal.copy())
-        return tracker.drive(obstacles_of(world.static), True, world.time, held)
+    def _follow(self, world: World, plan: Plan) -> Twist:
+        before = self._sent
+        twist = super()._follow(world, plan)
+        self._sent = np.array([twist.linear, twist.angular])
+        if self.along < plan.arc_lengths[-1] - 1e-9:
+            self._refine(world.robot, before)
+        return twist
 
-    def _refined(self, robot: RobotModel, commands: FloatArray) -> FloatArray:
-        """The best of commands (M, 2) and of what IPOPT makes of them."""
-        config, nominal, horizon = self.config, commands, self._horizon
-        problem = Problem(self, robot)
+    def _refine(self, robot: RobotModel, last: FloatArray) -> None:
+        """Compare commands (M, 2) of the solution with what IPOPT makes of them."""
+        config, nominal = self.config, self._tracker.solution
+        problem = Problem(self, robot, last)
         value = problem.cost(nominal)
         self.gain = (value, value)
-        units, last = horizon.units, horizon.last
-        low, high = horizon.program.low, horizon.program.high
+        units = np.array([robot.max_speed, robot.max_turn_rate])
+        low, high = bounds(robot, problem, last)
         solver, changes = self._nonlinear(problem, robot)
         n, count = 2 * config.moves, 5 * config.horizon
-        best = nominal
         for _ in range(_ROUNDS):
             states = problem.states(nominal)
             places = self._places(problem, robot, nominal, states)
@@ -83,9 +82,7 @@ class NonlinearPushingMpc(PushingMpc):
             z = np.clip(z, low[:n], high[:n])
             nominal = np.ascontiguousarray(z.reshape(2, -1).T * units)
             cost = problem.cost(nominal)
-            if cost < self.gain[1]:
-                best, self.gain = nominal, (value, cost)
-        return best
+            self.gain = (value, min(cost, self.gain[1]))
 
     def _nonlinear(self, problem: Problem, robot: RobotModel) -> tuple[Any, int]:
         """The solver, and its number of constraints on changes of commands."""
@@ -94,7 +91,8 @@ class NonlinearPushingMpc(PushingMpc):
             made = nonlinear_problem(
                 problem.contact, problem.weights, robot, problem.groups, self.config.moves
             )
-            changes = len(self._horizon.program.low) - 2 * self.config.moves
+            rates = (robot.max_acceleration, robot.max_turn_acceleration)
+            changes = self.config.moves * int(np.isfinite(rates).sum())
             self._solver_of = (key, made, changes)
         return self._solver_of[1], self._solver_of[2]
 
@@ -124,10 +122,10 @@ class NonlinearPushingMpc(PushingMpc):
 class Problem:
     """The problem of the present call, put up from what the tracker tells."""
 
-    def __init__(self, mpc: PushingMpc, robot: RobotModel) -> None:
-        config, horizon, tracker = mpc.config, mpc._horizon, mpc._tracker
+    def __init__(self, mpc: PushingMpc, robot: RobotModel, last: FloatArray) -> None:
+        config, tracker = mpc.config, mpc._tracker
         model = mpc.model
-        self.contact, self.steps = model.contact, horizon.steps
+        self.contact, self.steps = model.contact, tracker.steps
         self.groups = groups_of(config.horizon, config.moves)
         curvature = config.margin * model.stable_curvature()
         limited = model.stable_curvature() * model.reach > 0.02
@@ -149,9 +147,9 @@ class Problem:
             core.PushWeights(**vars(self.weights)),
             self._start,
             mpc.along,
-            horizon.last,
-            horizon.units,
-            horizon.steps,
+            last,
+            np.array([robot.max_speed, robot.max_turn_rate]),
+            self.steps,
             self.groups,
         )
         self._assembly = core.PushAssembly(config.horizon, config.moves)
@@ -168,6 +166,23 @@ class Problem:
         twists = nominal[self.groups]
         self.contact.roll_out(self._start, twists, self.steps, states, motions)
         return states
+
+
+def bounds(robot: RobotModel, problem: Problem, last: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Bounds of the 2 M variables, and of those changes that the robot limits, in units."""
+    moves = problem.groups[-1] + 1
+    units = (robot.max_speed, robot.max_turn_rate)
+    rates = (robot.max_acceleration, robot.max_turn_acceleration)
+    low, high = [-np.ones(2 * moves)], [np.ones(2 * moves)]
+    reaches = [rate / unit * problem.steps[0] for rate, unit in zip(rates, units, strict=True)]
+    least = _LEAST_SPEED * min(1.0, units[1] * problem.weights.length / units[0])
+    low[0][:moves] = min(least, last[0] / units[0] + reaches[0])
+    for reach, before in zip(reaches, last / units, strict=True):
+        if np.isfinite(reach):
+            first = np.eye(1, moves)[0] * before
+            low.append(first - reach)
+            high.append(first + reach)
+    return np.concatenate(low), np.concatenate(high)
 
 
 def nonlinear_problem(

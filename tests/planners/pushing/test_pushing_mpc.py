@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from nonlinear_pushing import NonlinearPushingMpc
 from pushing_scenes import SQUARE, best_offset, make_simulator, make_world, run
 
-from pushplan.control.mpc.quadratic_program import ProgramSolver
 from pushplan.planners.pushing import (
     PushingConfig,
     PushingMpc,
@@ -121,10 +120,9 @@ def test_the_program_gives_little_away():
     gains = []
 
     class Noted(NonlinearPushingMpc):
-        def _refined(self, robot, commands):
-            found = super()._refined(robot, commands)
+        def _refine(self, robot, last):
+            super()._refine(robot, last)
             gains.append(self.gain)
-            return found
 
     push("pymunk", AREA, 1.0, [(0.7, 0.0), (1.0, 0.5)], 0.3, config, controller=Noted(config))
     cost = np.array(gains)
@@ -188,17 +186,13 @@ def test_commands_are_always_within_limits(x, y, theta, bx, by, turn, burger):
     assert mpc.fallbacks <= 2  # the solver may be slow about what no robot meets
 
 
-def test_when_the_solver_fails_the_last_solution_is_driven_on():
-    config = PushingConfig(period=0.2)
+def test_where_the_solver_fails_from_the_beginning_the_robot_stands():
+    config = PushingConfig(period=0.2, solver_iterations=1, tolerance=1e-300)
     path, length = shaped(AREA, 1.0, S_SHAPE)
     world = make_world(AREA, [-1.01 * length, 0.0, 0.0], [[0.0, 0.0, 0.0]])
     mpc, plan = PushingMpc(config), path.plan(AREA, 0)
-    first = mpc.command(world, plan)
-    assert first.linear > 0.5 * AREA.max_speed
-    mpc._solver = ProgramSolver(mpc._horizon.program, 1e-300, 1)
-    later = [mpc.command(world.moved(time=0.2 * (i + 1)), plan) for i in range(30)]
-    assert later[0].linear > 0.0 and later[-1] == Twist(0.0, 0.0)
-    assert mpc.fallbacks == 30
+    found = [mpc.command(world.moved(time=0.2 * i), plan) for i in range(5)]
+    assert found == [Twist(0.0, 0.0)] * 5 and mpc.fallbacks == 5
 
 
 def test_steps_are_shared_out_among_commands():

@@ -24,6 +24,10 @@ struct Pose {
   bool operator==(const Pose&) const = default;
 };
 
+inline bool is_finite(const Pose& pose) {
+  return std::isfinite(pose.x) && std::isfinite(pose.y) && std::isfinite(pose.theta);
+}
+
 struct Segment {
   Vec2 from;
   Vec2 to;

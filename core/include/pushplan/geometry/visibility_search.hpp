@@ -50,7 +50,6 @@ class VisibilitySearch {
   Index end() const { return end_; }
   /// The node before each that has been reached, (V + E,).
   std::span<const Index> parents() const { return parents_; }
-  Index lines_tested() const { return lines_tested_; }
 
  private:
   /// A way of getting to a node, in most cases not tested yet.
@@ -85,7 +84,6 @@ class VisibilitySearch {
   std::vector<Index> parents_;
   std::vector<Entry> heap_;
   Index entries_ = 0;
-  Index lines_tested_ = 0;
   Index end_ = kStart;
 };
 

@@ -1,8 +1,88 @@
 #include "pushplan/control/mpc/horizon.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
 
 namespace pushplan::mpc {
+namespace {
+
+// heading errors from which a robot turns towards the path first [rad]
+constexpr double kTurnStopped = 0.25 * std::numbers::pi;
+constexpr double kTurnDriving = 0.5 * std::numbers::pi;
+constexpr std::size_t kSent =
+    256;  // commands under way; of more than these the oldest count no more
+
+/// The first variables of the blocks whose changes the robot limits.
+std::vector<Index> limited_blocks(const CommandLimits& limits, std::span<const Index> columns,
+                                  Index moves) {
+  std::vector<Index> blocks;
+  for (std::size_t c = 0; c < columns.size(); ++c) {
+    const double rate = columns[c] == 0 ? limits.max_acceleration : limits.max_turn_acceleration;
+    if (std::isfinite(rate)) blocks.push_back(static_cast<Index>(c) * moves);
+  }
+  return blocks;
+}
+
+}  // namespace
+
+Twist CommandLimits::nearest(const Twist& wanted, const Twist& last, double held,
+                             bool ramps) const {
+  Twist command = wanted;
+  if (ramps) {
+    const double dv = max_acceleration * held;
+    const double dw = max_turn_acceleration * held;
+    command.v = std::min(std::max(command.v, last.v - dv), last.v + dv);
+    command.w = std::min(std::max(command.w, last.w - dw), last.w + dw);
+  }
+  if (constant) command.v = max_speed;
+  command.v = std::min(std::max(command.v, min_speed), max_speed);
+  double most = max_turn_rate;
+  if (turning_radius > 0.0) most = std::min(most, std::abs(command.v) / turning_radius);
+  command.w = std::min(std::max(command.w, -most), most);
+  return command;
+}
+
+double CommandLimits::turn_from() const {
+  const bool on_the_spot = !constant && turning_radius == 0.0;
+  return on_the_spot ? kTurnStopped : kTurnDriving;
+}
+
+double CommandLimits::turning_speed() const {
+  return std::min(max_speed, max_turn_rate * turning_radius);
+}
+
+Horizon::Horizon(const CommandLimits& limits_, std::vector<Index> columns_, Index count_,
+                 Index moves, const SolverSettings& solver_, const Twist& before)
+    : limits(limits_),
+      units{limits.max_speed, limits.max_turn_rate},
+      columns(std::move(columns_)),
+      solver(solver_),
+      program(static_cast<Index>(columns.size()) * moves, moves,
+              limited_blocks(limits, columns, moves), solver),
+      steps(static_cast<std::size_t>(count_)),
+      solved(steps.size()),
+      shifted(steps.size()),
+      solution(static_cast<std::size_t>(moves)),
+      nominal(solution.size()),
+      last(before),
+      sent(kSent) {}
+
+/// Solves the program from the nominal commands, and replaces them; false if it is not solved.
+bool Horizon::solve_about_nominal() {
+  const auto for_each_variable = [&](const auto& visit) {
+    std::size_t i = 0;
+    for (const Index column : columns) {
+      double Twist::* const part = column == 0 ? &Twist::v : &Twist::w;
+      for (Twist& command : nominal) visit(program.x[i++], command.*part, units.*part);
+    }
+  };
+  for_each_variable([](double& x, const double& command, double unit) { x = command / unit; });
+  if (!program.solve()) return false;
+  for_each_variable([](const double& x, double& command, double unit) { command = x * unit; });
+  return true;
+}
 
 void Horizon::lay_steps(double span, double held) {
   const double part = span / static_cast<double>(steps.size());
@@ -37,7 +117,7 @@ void Horizon::set_bounds(double first, double later) {
     const std::size_t row = n + b * moves;
     for (std::size_t i = 0; i < moves; ++i) {
       const double reach = rate / unit * (i == 0 ? first : later);
-      const double before = i == 0 ? (is_speed ? last->v : last->w) / unit : 0.0;
+      const double before = i == 0 ? (is_speed ? last.v : last.w) / unit : 0.0;
       program.low[row + i] = before - reach;
       program.high[row + i] = before + reach;
     }
@@ -45,32 +125,18 @@ void Horizon::set_bounds(double first, double later) {
 }
 
 void Horizon::keep_solution() {
-  counts->known = 1;
+  known = true;
   std::ranges::copy(nominal, solution.begin());
   std::ranges::copy(steps, solved.begin());
 }
 
 Twist Horizon::send(const Twist& wanted, double held, bool ramps) {
-  Twist command = wanted;
-  if (ramps) {
-    const double dv = limits.max_acceleration * held;
-    const double dw = limits.max_turn_acceleration * held;
-    command.v = std::min(std::max(command.v, last->v - dv), last->v + dv);
-    command.w = std::min(std::max(command.w, last->w - dw), last->w + dw);
-  }
-  if (limits.constant) command.v = limits.max_speed;
-  command.v = std::min(std::max(command.v, limits.min_speed), limits.max_speed);
-  double most = limits.max_turn_rate;
-  if (limits.turning_radius > 0.0) {
-    most = std::min(most, std::abs(command.v) / limits.turning_radius);
-  }
-  command.w = std::min(std::max(command.w, -most), most);
-  *last = command;
-  return command;
+  last = limits.nearest(wanted, last, held, ramps);
+  return last;
 }
 
 void Horizon::remember(double time, double over) {
-  const Index count = counts->under_way;
+  const auto count = static_cast<Index>(under_way_count);
   const Index room = static_cast<Index>(sent.size());
   const auto followed = [&](Index i) {  // the command after it was sent by `over`
     return i + 1 < count && sent[static_cast<std::size_t>(i + 1)].time < over;
@@ -78,8 +144,8 @@ void Horizon::remember(double time, double over) {
   Index drop = 0;
   while (drop < count && (count - drop >= room || followed(drop))) ++drop;
   std::copy(sent.begin() + drop, sent.begin() + count, sent.begin());
-  sent[static_cast<std::size_t>(count - drop)] = {time, *last};
-  counts->under_way = count - drop + 1;
+  sent[static_cast<std::size_t>(count - drop)] = {time, last};
+  under_way_count = static_cast<std::size_t>(count - drop + 1);
 }
 
 }  // namespace pushplan::mpc

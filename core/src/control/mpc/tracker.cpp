@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
+
+#include "pushplan/control/pure_pursuit.hpp"
 
 namespace pushplan::mpc {
 namespace {
@@ -11,9 +12,6 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kBack = 0.25;   // greatest move back of the place from one call to the next [R]
 constexpr double kWindow = 2.0;  // distance ahead in which the next place is looked for [R]
-// heading errors from which a robot turns towards the path first [rad]
-constexpr double kTurnStopped = 0.25 * std::numbers::pi;
-constexpr double kTurnDriving = 0.5 * std::numbers::pi;
 
 /// Speed [m/s] that the plan has at a place, and that still allows to stop at its end.
 double speed_at(const ReferencePath& track, const PathPlace& place, const Tuning& tuning,
@@ -149,22 +147,35 @@ void TrackingAssembly::assemble(const ReferencePath& track, const Tuning& tuning
   }
 }
 
-Tracker::Tracker(const Horizon& horizon, const Tuning& tuning, double span, double delay)
-    : horizon_(horizon),
+Tracker::Tracker(const CommandLimits& limits, const Tuning& tuning, const SolverSettings& solver,
+                 Index steps, double span, double delay, const Twist& before)
+    : horizon_(limits, tuning.optimise_speed ? std::vector<Index>{1, 0} : std::vector<Index>{1},
+               steps, steps, solver, before),
       tuning_(tuning),
       span_(span),
       delay_(delay),
-      assembly_(static_cast<Index>(horizon.program.x.size())) {}
+      assembly_(static_cast<Index>(horizon_.program.x.size())) {}
 
 void Tracker::begin_track() {
   place_ = 0.0;
-  horizon_.counts->known = 0;
+  horizon_.known = false;
 }
 
-std::optional<Twist> Tracker::begin_step(const ReferencePath& track, const Pose& pose, double time,
-                                         double held) {
+Twist Tracker::follow(const ReferencePath& track, const Pose& pose, double time, double held) {
+  Twist command;
+  if (is_finite(pose) && !track.poses.empty()) {
+    command = command_for(track, pose, time, held);
+  } else {
+    horizon_.known = false;
+    command = horizon_.send({0.0, 0.0}, held, true);
+  }
+  if (delay_ > 0.0) horizon_.remember(time, time - delay_);  // as long as it has no effect yet
+  return command;
+}
+
+Twist Tracker::command_for(const ReferencePath& track, const Pose& pose, double time, double held) {
   horizon_.lay_steps(span_, held);
-  if (horizon_.counts->known == 1) shift(held);
+  if (horizon_.known) shift(held);
   predict(pose, time);
   const double low = std::max(place_ - kBack * tuning_.size, 0.0);
   const double high = place_ + kWindow * tuning_.size;
@@ -172,62 +183,28 @@ std::optional<Twist> Tracker::begin_step(const ReferencePath& track, const Pose&
   place_ = std::min(place.along, track.length());
   const double error = errors(track, pose_, place).error;
   if (tuning_.stops && place.along >= track.length() - 1e-9) {
-    horizon_.counts->known = 0;
-    const Twist command = horizon_.send({0.0, 0.0}, held, true);
-    remember(time);
-    return command;
+    horizon_.known = false;
+    return horizon_.send({0.0, 0.0}, held, true);
   }
-  if (std::abs(error) > turn_from()) {
+  if (std::abs(error) > horizon_.limits.turn_from()) {
     // too far from the path's heading for a linear model: turn towards it first
-    horizon_.counts->known = 0;
+    horizon_.known = false;
     const double turn = std::copysign(tuning_.max_turn_rate, -error);
-    const Twist command = horizon_.send({turning_speed(), turn}, held, true);
-    remember(time);
-    return command;
+    return horizon_.send({horizon_.limits.turning_speed(), turn}, held, true);
   }
   horizon_.set_bounds(horizon_.steps[0], horizon_.steps[1]);
-  const QuadraticProgram& program = horizon_.program;
+  QuadraticProgram& program = horizon_.program;
   // a plan is driven forwards
   for (std::size_t i = horizon_.steps.size(); i < program.x.size(); ++i) program.low[i] = 0.0;
-  if (horizon_.counts->known == 0) std::ranges::fill(horizon_.nominal, Twist{kNaN, kNaN});
-  assemble_step(track);
-  return std::nullopt;
-}
-
-void Tracker::assemble_step(const ReferencePath& track) {
-  assembly_.assemble(track, tuning_, pose_, place_, *horizon_.last, horizon_.steps,
-                     horizon_.nominal, horizon_.program.hessian, horizon_.program.gradient);
-}
-
-Twist Tracker::finish_step(const ReferencePath& track, const Pose& pose, double time, double held,
-                           bool solved) {
-  Twist command;
-  if (solved) {
-    horizon_.keep_solution();
-    horizon_.counts->missed = 0;
-    command = horizon_.send(horizon_.solution[0], held, false);
-  } else {
-    command = fall_back(track, pose, held);
-  }
-  remember(time);
-  return command;
-}
-
-/// Keeps what was sent for as long as it has no effect yet.
-void Tracker::remember(double time) {
-  if (delay_ > 0.0) horizon_.remember(time, time - delay_);
-}
-
-/// The heading error from which the robot turns towards the path first [rad].
-double Tracker::turn_from() const {
-  const bool on_the_spot = tuning_.stops && horizon_.limits.turning_radius == 0.0;
-  return on_the_spot ? kTurnStopped : kTurnDriving;
-}
-
-/// The speed at which a robot that can stop turns as fast as it can [m/s].
-double Tracker::turning_speed() const {
-  const CommandLimits& limits = horizon_.limits;
-  return std::min(limits.max_speed, limits.max_turn_rate * limits.turning_radius);
+  if (!horizon_.known) std::ranges::fill(horizon_.nominal, Twist{kNaN, kNaN});
+  const bool solved = horizon_.solve([&] {
+    assembly_.assemble(track, tuning_, pose_, place_, horizon_.last, horizon_.steps,
+                       horizon_.nominal, program.hessian(), program.gradient);
+  });
+  if (!solved) return fall_back(track, pose, held);
+  horizon_.keep_solution();
+  horizon_.missed = 0;
+  return horizon_.send(horizon_.solution[0], held, false);
 }
 
 /// Moves the last solution on by the time that has passed since; NaN past its end.
@@ -257,49 +234,13 @@ void Tracker::predict(const Pose& pose, double time) {
 
 /// Drives the last solution, moved on; pure pursuit where it has run out.
 Twist Tracker::fall_back(const ReferencePath& track, const Pose& pose, double held) {
-  HorizonCounts& counts = *horizon_.counts;
   const Twist ahead = horizon_.solution[0];
-  ++counts.failed;
-  ++counts.missed;
-  const bool known = counts.known == 1 && std::isfinite(ahead.v) && std::isfinite(ahead.w);
-  if (known && counts.missed < horizon_.count()) return horizon_.send(ahead, held, true);
-  counts.known = 0;
-  return horizon_.send(pursue(track, pose), held, true);
-}
-
-Twist Tracker::pursue(const ReferencePath& track, const Pose& pose) const {
-  const auto lengths = track.lengths;
-  const auto poses = track.poses;
-  const std::size_t last = lengths.size() - 1;
-  const double aim = place_ + tuning_.size;
-  std::size_t i = 0;
-  while (i < last && lengths[i + 1] <= place_) ++i;
-  double speed = track.speeds[i];
-  while (i + 1 < last && lengths[i + 1] < aim) ++i;
-  Vec2 target;
-  if (aim >= lengths[last]) {  // continue the last heading beyond the end
-    const double over = aim - lengths[last];
-    target = {poses[last].x + over * std::cos(poses[last].theta),
-              poses[last].y + over * std::sin(poses[last].theta)};
-  } else {
-    const double fraction = (aim - lengths[i]) / (lengths[i + 1] - lengths[i]);
-    target = {poses[i].x + fraction * (poses[i + 1].x - poses[i].x),
-              poses[i].y + fraction * (poses[i + 1].y - poses[i].y)};
-  }
-  const double dx = target.x - pose.x;
-  const double dy = target.y - pose.y;
-  const double bearing = wrap_angle(std::atan2(dy, dx) - pose.theta);
-  if (std::abs(bearing) > turn_from()) {
-    const double turn = std::copysign(tuning_.max_turn_rate, bearing);
-    return {tuning_.stops ? turning_speed() : speed, turn};
-  }
-  double curvature = 2.0 * std::sin(bearing) / std::max(std::sqrt(dx * dx + dy * dy), 1e-9);
-  const double radius = horizon_.limits.turning_radius;
-  if (radius > 0.0) curvature = std::min(std::max(curvature, -1.0 / radius), 1.0 / radius);
-  if (tuning_.stops && std::abs(curvature) * speed > tuning_.max_turn_rate) {
-    speed = tuning_.max_turn_rate / std::abs(curvature);
-  }
-  return {speed, speed * curvature};
+  ++horizon_.failed;
+  ++horizon_.missed;
+  const bool known = horizon_.known && std::isfinite(ahead.v) && std::isfinite(ahead.w);
+  if (known && horizon_.missed < horizon_.count()) return horizon_.send(ahead, held, true);
+  horizon_.known = false;
+  return horizon_.send(pursue(track, pose, place_, tuning_.size, horizon_.limits), held, true);
 }
 
 }  // namespace pushplan::mpc

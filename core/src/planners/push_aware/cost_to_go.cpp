@@ -3,10 +3,11 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include "pushplan/arithmetic.hpp"
+#include "pushplan/motion/dubins.hpp"
 #include "pushplan/search/grid_dijkstra.hpp"
-#include "pushplan/zeroed_array.hpp"
 
 namespace pushplan {
 namespace {
@@ -16,6 +17,29 @@ constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kLeastWeight = 0.25;  // of the cells with a value, for an interpolated one
 constexpr double kSome = 1e-9;         // weight from which a cell counts
 constexpr double kLargest = 1e9;       // change of a value that was infinite [m]
+constexpr double kCell = 0.33;         // side of a cell [R]
+constexpr double kCoarsest = 0.8;      // side beyond which a table would not resolve the robot [R]
+constexpr double kMostCells = 16'000;  // (x, y) at most; larger maps get larger cells
+constexpr double kArc = 2.0;           // length of the arcs that carry values [cells]
+constexpr double kSettled = 0.02;      // change of a value below which the table is done [R]
+constexpr Index kMostSweeps = 60;
+constexpr Index kBlock = 60;                             // cells that are worked on in a step
+constexpr std::array<double, 3> kSides{-1.0, 0.0, 1.0};  // of the arcs, in greatest curvatures
+
+double least_cell(const Box& bounds, double size) {
+  const double width = bounds.x_max - bounds.x_min;
+  const double height = bounds.y_max - bounds.y_min;
+  return std::max(
+      {kCell * size, std::sqrt(width * height / kMostCells), std::max(width, height) / kMostCells});
+}
+
+bool is_finite(const Box& box) {
+  return std::isfinite(box.x_max - box.x_min) && std::isfinite(box.y_max - box.y_min);
+}
+
+Index cells_along(double length, double cell) {
+  return std::max(static_cast<Index>(std::ceil(length / cell)), Index{1});
+}
 
 /// Two neighbouring headings of a table.
 struct HeadingPair {
@@ -66,19 +90,8 @@ double interpolate(ArrayView<const double, 3> values, const Cells& cells, Vec2 p
   return weight > kLeastWeight ? total / weight : kInfinity;
 }
 
-}  // namespace
-
-Index CostToGo::heading_of(double theta) const {
-  const auto count = static_cast<double>(headings());
-  return floor_mod(floor_index(theta / kTurn * count + 0.5), headings());
-}
-
-double CostToGo::length_to_go(const Pose& pose) const {
-  const double value =
-      interpolate(values, cells, {pose.x, pose.y}, headings_around(pose.theta, headings()));
-  return value == kInfinity ? floor(row_of(pose.y), column_of(pose.x)) : value;
-}
-
+/// Marks which of the cells from `first` to `last` (exclusive), counted row by row, hold the
+/// footprint. `free` is (rows, columns, headings).
 void mark_free(ArrayView<bool, 3> free, Index first, Index last, const Cells& cells,
                const Footprint& footprint, const ConvexObstacles& walls) {
   CollisionChecker checker(footprint, walls);
@@ -95,6 +108,14 @@ void mark_free(ArrayView<bool, 3> free, Index first, Index last, const Cells& ce
   }
 }
 
+/// Grid lengths to a goal.
+struct Flood {
+  std::vector<double> lengths;  // of each cell, row by row [m]
+  std::vector<Index> order;     // the cells in the order of their lengths
+};
+
+/// Floods the open cells, (rows, columns), from a goal. `centre` is the cell of the goal's middle,
+/// negative for none: a disc may be smaller than a cell.
 Flood flood(ArrayView<const bool, 2> open, const Cells& cells, const GoalRegion& goal,
             Index centre) {
   const Index columns = open.extent(1);
@@ -114,6 +135,14 @@ Flood flood(ArrayView<const bool, 2> open, const Cells& cells, const GoalRegion&
           {search.order().begin(), search.order().end()}};
 }
 
+/// Where short arcs lead to from each heading of a table.
+struct ArcEnds {
+  ArrayView<const Pose, 2> ends;  // (headings, arcs) displacement, and heading at the end
+  double length;                  // of the arcs [m]
+};
+
+/// One Gauss-Seidel sweep over the cells in some order, by their distances from the goal. `values`
+/// are those of the table. Returns the greatest change [m].
 double sweep_cost_to_go(ArrayView<double, 3> values, const CostToGo& table,
                         ArrayView<const bool, 3> free, std::span<const Index> order,
                         const ArcEnds& arcs) {
@@ -147,6 +176,97 @@ double sweep_cost_to_go(ArrayView<double, 3> values, const CostToGo& table,
     }
   }
   return change;
+}
+
+}  // namespace
+
+Index CostToGo::heading_of(double theta) const {
+  const auto count = static_cast<double>(headings());
+  return floor_mod(floor_index(theta / kTurn * count + 0.5), headings());
+}
+
+double CostToGo::length_to_go(const Pose& pose) const {
+  const double value =
+      interpolate(values, cells, {pose.x, pose.y}, headings_around(pose.theta, headings()));
+  return value == kInfinity ? floor(row_of(pose.y), column_of(pose.x)) : value;
+}
+
+CostToGoMaker::CostToGoMaker(const Footprint& footprint, const ConvexObstacles& walls,
+                             const GoalRegion& goal, double size, double radius, Index headings)
+    : footprint_(footprint),
+      walls_(walls),
+      goal_(goal),
+      cells_{{walls.bounds.x_min, walls.bounds.y_min}, least_cell(walls.bounds, size)},
+      useful_(is_finite(walls.bounds) && cells_.step <= kCoarsest * size && size < kInfinity),
+      done_(!useful_),
+      rows_(useful_ ? cells_along(walls.bounds.y_max - walls.bounds.y_min, cells_.step) : 1),
+      columns_(useful_ ? cells_along(walls.bounds.x_max - walls.bounds.x_min, cells_.step) : 1),
+      headings_(headings),
+      settled_(kSettled * size),
+      length_(kArc * cells_.step),
+      free_(cell_count() * headings),
+      values_(static_cast<std::size_t>(cell_count() * headings), kInfinity),
+      floor_(static_cast<std::size_t>(cell_count()), kInfinity) {
+  for (Index k = 0; k < headings; ++k) {
+    const double theta = kTurn * static_cast<double>(k) / static_cast<double>(headings);
+    for (const double side : kSides) {
+      ends_.push_back(along_arc({0.0, 0.0, theta}, {length_, side / radius}));
+    }
+  }
+}
+
+CostToGo CostToGoMaker::table() const {
+  return {
+      {values_.data(), {rows_, columns_, headings_}}, {floor_.data(), {rows_, columns_}}, cells_};
+}
+
+void CostToGoMaker::step() {
+  if (done_) return;
+  if (!flooded()) {
+    const Index last = std::min(marked_ + kBlock, cell_count());
+    mark_free(free(), marked_, last, cells_, footprint_, walls_);
+    marked_ = last;
+    if (flooded()) flood_cells();
+    return;
+  }
+  const std::size_t last = std::min(at_ + static_cast<std::size_t>(kBlock), order_.size());
+  const ArcEnds arcs{{ends_.data(), {headings_, Index{kSides.size()}}}, length_};
+  const double change = sweep_cost_to_go({values_.data(), {rows_, columns_, headings_}}, table(),
+                                         free(), std::span(order_).subspan(at_, last - at_), arcs);
+  change_ = std::max(change_, change);
+  at_ = last;
+  if (last < order_.size()) return;
+  ++sweeps_;
+  done_ = change_ < settled_ || sweeps_ >= kMostSweeps;
+  at_ = 0;
+  change_ = 0.0;
+}
+
+void CostToGoMaker::flood_cells() {
+  const auto fits = [&](Index at) {
+    const bool* flags = free_.data() + at * headings_;
+    return std::any_of(flags, flags + headings_, [](bool flag) { return flag; });
+  };
+  const ZeroedArray<bool> open(cell_count());
+  for (Index at = 0; at < cell_count(); ++at) open[at] = fits(at);
+  Index centre = -1;
+  if (goal_.kind == GoalRegion::Kind::kDisc) {
+    const double x = (goal_.point.x - cells_.origin.x) / cells_.step;
+    const double y = (goal_.point.y - cells_.origin.y) / cells_.step;
+    if (x >= 0.0 && x < static_cast<double>(columns_) && y >= 0.0 &&
+        y < static_cast<double>(rows_)) {
+      centre = static_cast<Index>(y) * columns_ + static_cast<Index>(x);
+    }
+  }
+  Flood found = flood({open.data(), {rows_, columns_}}, cells_, goal_, centre);
+  floor_ = std::move(found.lengths);
+  order_ = std::move(found.order);
+  for (Index at = 0; at < cell_count(); ++at) {
+    if (floor_[static_cast<std::size_t>(at)] != 0.0) continue;
+    for (Index k = at * headings_; k < (at + 1) * headings_; ++k) {
+      if (free_[k]) values_[static_cast<std::size_t>(k)] = 0.0;
+    }
+  }
 }
 
 }  // namespace pushplan

@@ -18,11 +18,15 @@ constexpr double kGraze = 0.1;
 
 Clearance::Clearance(const Polygons& parts, std::span<const double> radii,
                      const ClearanceLimits& limits)
-    : parts_(parts), radii_(radii), limits_(limits), placed_(parts.vertices.size()) {}
+    : vertices_(parts.vertices.begin(), parts.vertices.end()),
+      offsets_(parts.offsets.begin(), parts.offsets.end()),
+      radii_(radii.begin(), radii.end()),
+      limits_(limits),
+      placed_(vertices_.size()) {}
 
 /// The distance of a part at a pose [m], if it is less than the least so far.
 double Clearance::gap_of(Index part, const Pose& pose, double least, const Obstacles& obstacles) {
-  const Polygon body = parts_[part];
+  const Polygon body = parts()[part];
   transform(pose, body, placed_.data());
   const Polygon placed(placed_.data(), body.size());
   for (std::size_t k = 0; k < obstacles.radii.size(); ++k) {
@@ -40,7 +44,7 @@ double Clearance::gap_of(Index part, const Pose& pose, double least, const Obsta
 
 Clearance::Gaps Clearance::gaps(const BoxContact& contact, double normal, const PushState& state,
                                 const Obstacles& obstacles) {
-  const Index last = parts_.count() - 1;
+  const Index last = parts().count() - 1;
   double robot = kInfinity;
   for (Index part = 0; part < last; ++part) robot = gap_of(part, state.robot, robot, obstacles);
   const Pose box = box_pose(contact, state);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 namespace pushplan::pushing {
 namespace {
@@ -30,19 +31,21 @@ constexpr std::array<double, 3> kTurnsTried{0.1, 0.3, 0.7};  // to both sides [s
 
 }  // namespace
 
-PushTracker::PushTracker(const mpc::Horizon& horizon, const PushTuning& tuning, const Faces& faces,
-                         const Clearance& clearance)
-    : horizon_(horizon),
+PushTracker::PushTracker(const mpc::CommandLimits& limits, const PushTuning& tuning,
+                         const mpc::SolverSettings& solver, const Twist& before)
+    : horizon_(limits, {0, 1}, static_cast<Index>(tuning.groups.size()), tuning.groups.back() + 1,
+               solver, before),
       tuning_(tuning),
-      faces_(faces),
-      clearance_(clearance),
-      assembly_(horizon.count(), horizon.program.moves) {}
+      assembly_(horizon_.count(), horizon_.program.moves) {}
 
-void PushTracker::begin(double direction) {
+void PushTracker::begin(std::vector<Face> faces, const Clearance& clearance, double direction) {
+  faces_ = std::move(faces);
+  clearance_ = clearance;
+  face_ = 0;
   along_ = 0.0;
   slowed_ = 1.0;
-  horizon_.counts->missed = 0;
-  horizon_.counts->known = 0;
+  horizon_.missed = 0;
+  horizon_.known = false;
   take_face(direction);
 }
 
@@ -51,8 +54,8 @@ void PushTracker::take_face(double direction) {
   double best = -kInfinity;
   const double c = std::cos(direction);
   const double s = std::sin(direction);
-  for (std::size_t k = 0; k < faces_.scores.size(); ++k) {
-    const FaceScore& face = faces_.scores[k];
+  for (std::size_t k = 0; k < faces_.size(); ++k) {
+    const FaceScore& face = faces_[k].score;
     const double score = face.x * c + face.y * s + face.bias;
     if (score > best) {
       best = score;
@@ -64,10 +67,10 @@ void PushTracker::take_face(double direction) {
 
 /// Estimates the state from poses, now and for when a command of now takes effect.
 void PushTracker::estimate(const Pose& robot, const Pose& box, double time) {
-  PushState seen = pushing::observe(contact(), faces_.normals[face_], robot, box);
+  PushState seen = pushing::observe(contact(), faces_[face_].normal, robot, box);
   if (std::abs(seen.angle) > kFaceTurned) {
     take_face(robot.theta - box.theta);
-    seen = pushing::observe(contact(), faces_.normals[face_], robot, box);
+    seen = pushing::observe(contact(), faces_[face_].normal, robot, box);
   }
   correct(seen, time);
   guess_ = state_;
@@ -116,31 +119,39 @@ void PushTracker::predict(double begin, double end) {
   }
 }
 
-bool PushTracker::observe(const mpc::ReferencePath& track, const Pose& robot, const Pose& box,
-                          double time, double held) {
+Twist PushTracker::follow(const mpc::ReferencePath& track, const Obstacles& obstacles,
+                          const Pose& robot, const Pose& box, double time, double held) {
   slowed_ = 1.0;
+  if (!is_finite(robot) || !is_finite(box)) {
+    horizon_.known = false;
+    return stop(time, held);
+  }
   estimate(robot, box, time);
+  if (!advance_along(track)) return stop(time, held);
+  const PushingProblem problem = problem_now(track, held);
+  begin_commands(held);
+  mpc::QuadraticProgram& program = horizon_.program;
+  const bool solved = horizon_.solve(
+      [&] { assembly_.assemble(problem, horizon_.nominal, program.hessian(), program.gradient); });
+  return drive(obstacles, solved, time, held);
+}
+
+/// Moves on to the box's place on the path. False at its end.
+bool PushTracker::advance_along(const mpc::ReferencePath& track) {
   const double size = contact().reach();
   const Pose at = box_pose(contact(), guess_);
   const double low = std::max(along_ - kSearchBack * size, 0.0);
   const mpc::PathPlace place = mpc::locate(track, {at.x, at.y}, low, along_ + kSearchAhead * size);
   along_ = std::min(place.along, track.length());
-  const Pose& path =
-      track.poses[std::min(static_cast<std::size_t>(place.index), track.poses.size() - 1)];
-  lateral_ = (at.y - path.y) * std::cos(path.theta) - (at.x - path.x) * std::sin(path.theta);
-  if (!(place.along < track.length() - 1e-9)) return false;
-  const PushingProblem problem = problem_now(track, held);
-  begin_commands(held);
-  value_ = assembly_.assemble(problem, horizon_.nominal, horizon_.program.hessian,
-                              horizon_.program.gradient);
-  return true;
+  return place.along < track.length() - 1e-9;
 }
 
 /// Lays the steps and the bounds, and puts up the problem from the state in effect.
 PushingProblem PushTracker::problem_now(const mpc::ReferencePath& track, double held) {
   PushWeights weights = tuning_.weights;
   weights.length = contact().reach();
-  weights.curvature = faces_.curvatures[face_];
+  weights.half = contact().half;
+  weights.curvature = faces_[face_].curvature;
   const double length = weights.length;
   const double max_speed = weights.max_speed;
   const mpc::CommandLimits& limits = horizon_.limits;
@@ -150,18 +161,18 @@ PushingProblem PushTracker::problem_now(const mpc::ReferencePath& track, double 
   const double reach = limits.max_acceleration / max_speed * horizon_.steps[0];
   const double least = kLeastSpeed * std::min(1.0, limits.max_turn_rate * length / max_speed);
   std::fill_n(horizon_.program.low.begin(), horizon_.program.moves,
-              std::min(least, horizon_.last->v / max_speed + reach));
+              std::min(least, horizon_.last.v / max_speed + reach));
   PushState near = guess_;  // no farther away than the model means anything for
   const double far = kMaxOffset * contact().half;
   near.offset = std::min(std::max(near.offset, -far), far);
   near.gap = std::min(near.gap, kMaxGap * length);
   return {contact(),      track,          weights,        near,          along_,
-          *horizon_.last, horizon_.units, horizon_.steps, tuning_.groups};
+          horizon_.last,  horizon_.units, horizon_.steps, tuning_.groups};
 }
 
 /// Sets the nominal commands to the last solution, moved on, or to full speed straight on.
 void PushTracker::begin_commands(double held) {
-  if (horizon_.counts->known == 1) {
+  if (horizon_.known) {
     shift(held);
   } else {
     std::fill_n(horizon_.nominal.begin(), horizon_.program.moves,
@@ -169,15 +180,10 @@ void PushTracker::begin_commands(double held) {
   }
 }
 
-void PushTracker::assemble(const mpc::ReferencePath& track, double held) {
-  value_ = assembly_.assemble(problem_now(track, held), horizon_.nominal, horizon_.program.hessian,
-                              horizon_.program.gradient);
-}
-
 /// Sets the nominal commands to the last solution, moved on by the time since.
 void PushTracker::shift(double held) {
   horizon_.shift_steps(held);
-  const auto groups = tuning_.groups;
+  const std::span<const Index> groups = tuning_.groups;
   const Index last = static_cast<Index>(groups.size()) - 1;
   for (std::size_t k = 0; k < groups.size(); ++k) {
     if (k != 0 && groups[k] == groups[k - 1]) continue;
@@ -188,23 +194,23 @@ void PushTracker::shift(double held) {
   }
 }
 
+/// The command of the solution, as fast as what is static allows.
 Twist PushTracker::drive(const Obstacles& obstacles, bool solved, double time, double held) {
-  mpc::HorizonCounts& counts = *horizon_.counts;
   if (solved) {
-    counts.missed = 0;
+    horizon_.missed = 0;
     horizon_.keep_solution();
   } else {
-    ++counts.failed;
-    ++counts.missed;
-    if (counts.missed > horizon_.count()) counts.known = 0;
+    ++horizon_.failed;
+    ++horizon_.missed;
+    if (horizon_.missed > horizon_.count()) horizon_.known = false;
   }
-  if (counts.known == 0) return send({0.0, 0.0}, time, held);
+  if (!horizon_.known) return stop(time, held);
   Twist twist = horizon_.solution[0];
   const double length = contact().reach();
   const double look =
       std::max(kClearPeriods * held, 2.0 * std::abs(twist.v) / horizon_.limits.max_acceleration);
   const auto free_fraction = [&](const Twist& tried) {
-    return clearance_.free_fraction(contact(), faces_.normals[face_], guess_, tried, look,
+    return clearance_->free_fraction(contact(), faces_[face_].normal, guess_, tried, look,
                                     obstacles);
   };
   double free = free_fraction(twist);
@@ -225,6 +231,7 @@ Twist PushTracker::drive(const Obstacles& obstacles, bool solved, double time, d
   return send({free * twist.v, free * twist.w}, time, held);
 }
 
+/// Sends a command within the accelerations, and remembers it.
 Twist PushTracker::send(const Twist& wanted, double time, double held) {
   const Twist command = horizon_.send(wanted, held, true);
   // what another command had followed in effect when the state was observed moves it no more

@@ -2,8 +2,9 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
-#include "pushplan/array.hpp"
+#include "pushplan/control/mpc/quadratic_program.hpp"
 #include "pushplan/control/mpc/tracking.hpp"
 
 namespace pushplan::mpc {
@@ -17,18 +18,14 @@ struct CommandLimits {
   double max_acceleration;       // [m/s^2]
   double max_turn_acceleration;  // [rad/s^2]
   double turning_radius;         // that a car has at any speed [m]; 0 for other drives
-};
 
-/// Minimise 1/2 x'Px + q'x over n commands in blocks of M. A solver reads and writes the arrays, so
-/// they belong to the caller.
-struct QuadraticProgram {
-  Index moves;                    // M
-  std::span<const Index> blocks;  // (B,) first variable of each block whose changes are bounded
-  ArrayView<double, 2> hessian;   // (n, n) P
-  std::span<double> gradient;     // (n,) q
-  std::span<double> low;          // (n + B M,) bounds of the variables, then of their changes
-  std::span<double> high;
-  std::span<double> x;  // (n,) start, and solution
+  /// The nearest command within the limits, held for a time [s] after another one; `ramps`: within
+  /// the accelerations too.
+  Twist nearest(const Twist& wanted, const Twist& last, double held, bool ramps) const;
+  /// The heading error from which the robot turns towards the path first [rad].
+  double turn_from() const;
+  /// The speed at which a robot that can stop turns as fast as it can [m/s].
+  double turning_speed() const;
 };
 
 /// A command that has been sent.
@@ -37,34 +34,35 @@ struct SentCommand {
   Twist twist;
 };
 
-struct HorizonCounts {
-  Index under_way;  // commands
-  Index known;      // 1 if there is a solution
-  Index missed;     // failures of the solver since
-  Index failed;     // and ever
-};
-
-/// Commands for the next steps, from quadratic programs about the last solution. The arrays are
-/// shared with the solver's side.
+/// Commands for the next steps, from quadratic programs about the last solution.
 struct Horizon {
+  Horizon(const CommandLimits& limits,
+          std::vector<Index> columns,  // what each block of variables is: 0 speed, 1 turn rate
+          Index count,                 // N, steps
+          Index moves,                 // M, commands of each variable
+          const SolverSettings& solver,
+          const Twist& before);  // the command in force
+
   CommandLimits limits;
-  Twist units;                     // of speed and turn rate in the program
-  std::span<const Index> columns;  // (C,) what each block of variables is: 0 speed, 1 turn rate
-  QuadraticProgram program;        // over M commands of each, in units
-  std::span<double> steps;         // (N,) how long each step is [s]
-  std::span<double> solved;        // (N,) the same when the last solution was found
-  std::span<Index> shifted;        // (N,) the step of then that each one lies in; N past the end
-  std::span<Twist> solution;       // (M,)
-  std::span<Twist> nominal;        // (M,) what the next program is about
-  Twist* last;                     // the command before the first
-  std::span<SentCommand> sent;  // commands under way; of more than these the oldest count no more
-  HorizonCounts* counts;
+  Twist units;                 // of speed and turn rate in the program
+  std::vector<Index> columns;  // (C,)
+  SolverSettings solver;
+  QuadraticProgram program;       // over M commands of each, in units
+  std::vector<double> steps;      // (N,) how long each step is [s]
+  std::vector<double> solved;     // (N,) the same when the last solution was found
+  std::vector<Index> shifted;     // (N,) the step of then that each one lies in; N past the end
+  std::vector<Twist> solution;    // (M,)
+  std::vector<Twist> nominal;     // (M,) what the next program is about
+  Twist last;                     // the command before the first
+  std::vector<SentCommand> sent;  // commands under way, the first `under_way_count` count
+  std::size_t under_way_count = 0;
+  bool known = false;  // there is a solution
+  Index missed = 0;    // failures of the solver since
+  Index failed = 0;    // and ever
 
   Index count() const { return static_cast<Index>(steps.size()); }
   /// The commands under way.
-  std::span<const SentCommand> under_way() const {
-    return sent.first(static_cast<std::size_t>(counts->under_way));
-  }
+  std::span<const SentCommand> under_way() const { return std::span(sent).first(under_way_count); }
 
   /// Sets the steps: the first until the next call, `held`, the others a part of `span` [s].
   void lay_steps(double span, double held);
@@ -72,6 +70,17 @@ struct Horizon {
   void shift_steps(double held);
   /// Bounds the commands, +-1, and by what they change in times [s], in the program's units.
   void set_bounds(double first, double later);
+  /// Makes the nominal commands a solution of programs that `assemble` puts up about them. False if
+  /// the solver does not find one.
+  template <class Assemble>
+  bool solve(const Assemble& assemble) {
+    const Index rounds = known ? solver.rounds : solver.first_rounds;
+    for (Index i = 0; i < rounds; ++i) {
+      assemble();
+      if (!solve_about_nominal()) return false;
+    }
+    return true;
+  }
   /// Keeps the nominal commands as the solution for the present steps.
   void keep_solution();
   /// The nearest command within the limits, held for a time [s]; remembers it as the last. With
@@ -79,6 +88,9 @@ struct Horizon {
   Twist send(const Twist& wanted, double held, bool ramps);
   /// Adds the last command, sent at `time`, and drops those that another followed by `over`.
   void remember(double time, double over);
+
+ private:
+  bool solve_about_nominal();
 };
 
 }  // namespace pushplan::mpc

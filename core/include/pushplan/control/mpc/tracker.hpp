@@ -8,14 +8,13 @@
 // always be met.
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include "pushplan/control/mpc/horizon.hpp"
 
 namespace pushplan::mpc {
 
-/// Limits of the robot and weights of the cost.
+/// Limits of the robot and weights of the cost, which `MpcConfig` in Python describes.
 struct Tuning {
   double size;              // R, circumscribed radius [m]
   double max_speed;         // [m/s]
@@ -23,11 +22,11 @@ struct Tuning {
   double max_acceleration;  // [m/s^2]
   bool stops;               // the robot stops at the end of the path
   bool optimise_speed;
-  double heading_weight;
-  double turn_weight;
-  double smoothness;
-  double terminal;
-  double speed_weight;
+  double heading_weight = 0.5;
+  double turn_weight = 0.02;
+  double smoothness = 0.001;
+  double terminal = 4.0;
+  double speed_weight = 0.2;
 };
 
 /// Puts up the tracking problem: P and q of min 1/2 z'Pz + q'z over
@@ -61,39 +60,29 @@ class TrackingAssembly {
   std::vector<double> heading_slopes_;  // (n,) d heading error/dz
 };
 
-/// A tracker of one robot with its state. A caller makes each step: `begin_step` puts up the
-/// program, a solver solves it, `finish_step` gives the command.
+/// A tracker of one robot with its state: `follow` gives a command, and allocates nothing.
 class Tracker {
  public:
-  Tracker(const Horizon& horizon, const Tuning& tuning,
-          double span,    // time that the steps reach, if none is shorter than the period [s]
-          double delay);  // between a command and its effect [s]
+  Tracker(const CommandLimits& limits, const Tuning& tuning, const SolverSettings& solver,
+          Index steps,           // N
+          double span,           // time that they reach, if none is shorter than the period [s]
+          double delay,          // between a command and its effect [s]
+          const Twist& before);  // the command in force
 
   /// Begins a path.
   void begin_track();
 
-  /// Puts up the program for where the robot is, or returns the command where it is known without.
-  std::optional<Twist> begin_step(const ReferencePath& track, const Pose& pose,
-                                  double time,   // of the pose [s]
-                                  double held);  // from the last call to this one [s]
+  /// The command for where the robot is: of the solution, or what is nearest to it without one. A
+  /// pose that is not finite, or an empty path, gives a stop, or the least speed.
+  Twist follow(const ReferencePath& track, const Pose& pose,
+               double time,   // of the pose [s]
+               double held);  // from the last call to this one [s]
 
-  /// Puts up the program about the nominal commands.
-  void assemble_step(const ReferencePath& track);
-
-  /// The command: of the solution, or what is nearest to it if the program was not `solved`.
-  Twist finish_step(const ReferencePath& track, const Pose& pose, double time, double held,
-                    bool solved);
-
-  /// Speed and turn rate on the arc to a point R ahead (Coulter, CMU-RI-TR-92-01).
-  Twist pursue(const ReferencePath& track, const Pose& pose) const;
-
-  const Pose& pose() const { return pose_; }
-  double place() const { return place_; }
+  /// The commands ahead, and how often the solver has failed.
+  Horizon& horizon() { return horizon_; }
 
  private:
-  void remember(double time);
-  double turn_from() const;
-  double turning_speed() const;
+  Twist command_for(const ReferencePath& track, const Pose& pose, double time, double held);
   void shift(double held);
   void predict(const Pose& pose, double time);
   Twist fall_back(const ReferencePath& track, const Pose& pose, double held);

@@ -16,6 +16,7 @@
 #include "pushplan/geometry/distance_field.hpp"
 #include "pushplan/motion/collision.hpp"
 #include "pushplan/motion/goal_region.hpp"
+#include "pushplan/zeroed_array.hpp"
 
 namespace pushplan {
 
@@ -47,32 +48,52 @@ struct CostToGo {
   double length_to_go(const Pose& pose) const;
 };
 
-/// Marks which of the cells from `first` to `last` (exclusive), counted row by row, hold the
-/// footprint. `free` is (rows, columns, headings).
-void mark_free(ArrayView<bool, 3> free, Index first, Index last, const Cells& cells,
-               const Footprint& footprint, const ConvexObstacles& walls);
+/// Makes the table of a robot in small steps, so that a planning call can stop in between. The
+/// arrays of the footprint and the walls have to outlive it.
+class CostToGoMaker {
+ public:
+  static constexpr Index kHeadings = 32;
 
-/// Grid lengths to a goal.
-struct Flood {
-  std::vector<double> lengths;  // of each cell, row by row [m]
-  std::vector<Index> order;     // the cells in the order of their lengths
+  CostToGoMaker(const Footprint& footprint, const ConvexObstacles& walls, const GoalRegion& goal,
+                double size,    // circumscribed radius of the robot [m]
+                double radius,  // least turning radius [m]
+                Index headings = kHeadings);
+
+  /// True if a table of bearable size resolves the robot.
+  bool useful() const { return useful_; }
+  /// True if the floor of the table is known.
+  bool flooded() const { return marked_ == cell_count(); }
+  bool done() const { return done_; }
+  /// Goes on for less than two milliseconds.
+  void step();
+  /// The table with what is done of it.
+  CostToGo table() const;
+
+ private:
+  Index cell_count() const { return rows_ * columns_; }
+  ArrayView<bool, 3> free() const { return {free_.data(), {rows_, columns_, headings_}}; }
+  void flood_cells();
+
+  Footprint footprint_;
+  ConvexObstacles walls_;
+  GoalRegion goal_;
+  Cells cells_;
+  bool useful_;
+  bool done_;
+  Index rows_ = 1;
+  Index columns_ = 1;
+  Index headings_;
+  double settled_;              // change of a value below which the table is done [m]
+  double length_;               // of the arcs that carry values from cell to cell [m]
+  std::vector<Pose> ends_;      // (headings, arcs)
+  ZeroedArray<bool> free_;      // (rows, columns, headings)
+  std::vector<double> values_;  // the same shape
+  std::vector<double> floor_;   // (rows, columns)
+  std::vector<Index> order_;    // cells by their distance from the goal
+  Index marked_ = 0;            // cells of which it is known where the robot fits
+  std::size_t at_ = 0;          // the place in the order
+  Index sweeps_ = 0;
+  double change_ = 0.0;  // greatest one of this sweep [m]
 };
-
-/// Floods the open cells, (rows, columns), from a goal. `centre` is the cell of the goal's middle,
-/// negative for none: a disc may be smaller than a cell.
-Flood flood(ArrayView<const bool, 2> open, const Cells& cells, const GoalRegion& goal,
-            Index centre);
-
-/// Where short arcs lead to from each heading of a table.
-struct ArcEnds {
-  ArrayView<const Pose, 2> ends;  // (headings, arcs) displacement, and heading at the end
-  double length;                  // of the arcs [m]
-};
-
-/// One Gauss-Seidel sweep over the cells in some order, by their distances from the goal. `values`
-/// are those of the table. Returns the greatest change [m].
-double sweep_cost_to_go(ArrayView<double, 3> values, const CostToGo& table,
-                        ArrayView<const bool, 3> free, std::span<const Index> order,
-                        const ArcEnds& arcs);
 
 }  // namespace pushplan

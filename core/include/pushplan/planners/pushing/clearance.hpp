@@ -14,7 +14,7 @@ struct ClearanceLimits {
   double slack;  // distance by which a body that is too near already may come nearer [m]
 };
 
-/// The distances of a robot and a box, with memory for one thread. The arrays have to outlive it.
+/// The distances of a robot and a box, with memory for one thread.
 class Clearance {
  public:
   Clearance(const Polygons& parts,          // of the robot, then the box, in their frames [m]
@@ -38,8 +38,11 @@ class Clearance {
  private:
   double gap_of(Index part, const Pose& pose, double least, const Obstacles& obstacles);
 
-  Polygons parts_;
-  std::span<const double> radii_;
+  Polygons parts() const { return {vertices_, offsets_}; }
+
+  std::vector<Vec2> vertices_;  // of the parts
+  std::vector<Index> offsets_;
+  std::vector<double> radii_;
   ClearanceLimits limits_;
   std::vector<Vec2> placed_;  // corners in the world
 };

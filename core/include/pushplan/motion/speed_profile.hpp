@@ -1,0 +1,35 @@
+// Speeds and times along a path: full speed, slower where curvature or accelerations ask for it.
+#pragma once
+
+#include <span>
+
+#include "pushplan/motion/dubins.hpp"
+
+namespace pushplan {
+
+/// Limits of a robot along a path, and its motion at the start.
+struct SpeedLimits {
+  double size;                   // circumscribed radius [m]
+  double max_speed;              // [m/s]
+  double min_speed;              // [m/s], negative if it may reverse
+  double turn_rate;              // greatest one that plans use [rad/s]
+  double max_acceleration;       // [m/s^2], infinite where speed can jump
+  double max_turn_acceleration;  // [rad/s^2]
+  bool can_stop;                 // else it always drives at `max_speed`
+  double driven_speed;           // at the start [m/s]
+  double driven_turn_rate;       // [rad/s]
+};
+
+/// Times of the poses [s], and speed [m/s] and turn rate [rad/s] from each pose on; (N,) each.
+struct SpeedProfile {
+  std::span<double> times;
+  std::span<double> speeds;
+  std::span<double> turn_rates;
+};
+
+/// Writes the profile of a path of N poses, at least one, that are `chords` (N - 1,) apart [m].
+/// Steps against the heading are driven back; those of infinite curvature turn on the spot.
+void fill_speed_profile(const Path& path, std::span<const double> chords, const SpeedLimits& limits,
+                        const SpeedProfile& profile);
+
+}  // namespace pushplan

@@ -1,0 +1,1 @@
+/* How OSQP is built here: no printing, no timers, no interrupts, no derivatives. */
