@@ -142,6 +142,7 @@ Scene::Scene(const World& of) : world(of) {
     alone.add(object.outline);
     for (Vec2& p : alone.vertices) p = {p.x - centre.x, p.y - centre.y};
     objects.add(alone.vertices);
+    first_parts.push_back(objects.polygons().count());
     poses.push_back({centre.x, centre.y, 0.0});
     masses.push_back(object.mass);
     radii.push_back(alone.radius());
@@ -194,6 +195,7 @@ Bodies Scene::bodies() const {
           robot.polygons().count(),
           size,
           objects.polygons(),
+          {objects.polygons(), first_parts},
           radii,
           inverse_masses,
           inverse_gyration,

@@ -41,6 +41,7 @@ struct Scene {
   Outlines robot;
   Outlines walls;
   Outlines objects;            // each about its centroid
+  std::vector<Index> first_parts{0};
   double size;                 // R, circumscribed radius of the robot [m]
   double turning_radius;       // least one at full speed [m]
   std::vector<Pose> poses;     // (K,) of the objects
