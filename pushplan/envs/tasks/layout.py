@@ -12,6 +12,7 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
+from pushplan.envs.tasks.object_shapes import objects_of_many_shapes
 from pushplan.envs.tasks.presets import Preset
 from pushplan.geometry import GeodesicField
 from pushplan.world import Movables, Receptacle, RobotModel, ScenarioError, StaticMap
@@ -273,7 +274,7 @@ def place_boxes(
     wanted: Any,
     **rules: Any,
 ) -> Movables:
-    """Square boxes on free floor, of which some stand on casters.
+    """Square boxes, or objects that fit in them, on free floor; some of them stand on casters.
 
     Args:
         free_space: the floor.
@@ -282,8 +283,8 @@ def place_boxes(
         size: side [m].
         robot: Shapely geometries of the robot.
         preset: of a task with boxes.
-        wanted: the variations of that task: heading, fraction on casters, whether boxes may touch
-            the robot.
+        wanted: the variations of that task: shapes, heading, fraction on casters, whether boxes may
+            touch the robot.
         rules: as `FreeSpace.place_squares` takes them.
 
     Raises:
@@ -307,6 +308,11 @@ def place_boxes(
     masses = None
     if preset.box_mass is not None:
         masses = np.full(count, preset.box_mass)
+    if wanted.objects == "many":  # each as heavy as a box
+        if masses is None:
+            masses = np.full(count, size * size)
+        contact_radius = preset.contact_radius
+        return objects_of_many_shapes(rng, poses, size, masses, on_casters, contact_radius)
     return Movables.from_outlines(
         [_CORNERS * size] * count,
         poses,

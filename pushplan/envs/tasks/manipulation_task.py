@@ -12,7 +12,7 @@ import numpy as np
 
 from pushplan.envs.tasks.base import StepOutcome, Task
 from pushplan.envs.tasks.layout import GAP, FreeSpace, footprint_at, goal_distances, place_boxes
-from pushplan.envs.tasks.variations import TaskVariations, Yaw
+from pushplan.envs.tasks.variations import Objects, TaskVariations, Yaw
 from pushplan.geometry import GeodesicField, Grid, clearance_field, geodesic_field
 from pushplan.geometry.free_components import FreeComponents
 from pushplan.geometry.grid import nearest_marked
@@ -52,6 +52,7 @@ class ManipulationVariations(TaskVariations):
     boxes: PositiveInt | None = None  # number of boxes, at least 1
     # side of the boxes [m], at least 1 % of the preset's; their least spacing grows with it
     box_size: PositiveFloat | None = None
+    objects: Objects = "boxes"  # shapes: ``"boxes"``, or ``"many"`` of them
     box_yaw: Yaw  # headings of the boxes at the start, ``"aligned"`` or ``"random"``
     wheeled: Fraction = 0.0  # fraction of the boxes that stand on casters, 0 to 1
     robot: str | None = None  # one of the preset's robots

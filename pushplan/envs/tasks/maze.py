@@ -19,7 +19,7 @@ from pushplan.envs.tasks.layout import (
     walls_around,
 )
 from pushplan.envs.tasks.presets import Preset, read_presets
-from pushplan.envs.tasks.variations import TaskVariations, Yaw
+from pushplan.envs.tasks.variations import Objects, TaskVariations, Yaw
 from pushplan.geometry.distance_field import GeodesicField, geodesic_field
 from pushplan.observation import ImageObservation
 from pushplan.world import BUMPERS, GoalDisc, ScenarioError, StaticMap, World
@@ -66,6 +66,7 @@ class MazeVariations(TaskVariations):
     shape: Annotated[str, OneOf(("u", "z"))] = "u"  # ``"u"`` or ``"z"``
     boxes: NonNegativeInt = 5  # number of boxes
     box_size: PositiveFloat | None = None  # side of the boxes [m]
+    objects: Objects = "boxes"  # shapes: ``"boxes"``, or ``"many"`` of them
     # headings of the boxes at the start, ``"aligned"`` with the walls or ``"random"``
     box_yaw: Yaw = "aligned"
     wheeled: Fraction = 0.0  # fraction of the boxes that stand on casters, 0 to 1

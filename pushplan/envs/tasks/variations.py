@@ -11,6 +11,8 @@ from pushplan.world.checked_fields import CheckedFields, OneOf, PositiveFloat
 
 Yaw = Annotated[str, OneOf(("aligned", "random"))]
 """Headings of boxes at the start."""
+Objects = Annotated[str, OneOf(("boxes", "many"))]
+"""Shapes of objects: square boxes, or boxes, L, T and U shapes, chairs and tables."""
 
 
 @dataclass(frozen=True, kw_only=True)

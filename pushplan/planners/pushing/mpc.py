@@ -12,11 +12,12 @@ from pushplan.control.limits import driven_twist
 from pushplan.control.mpc.inputs import limits_of, track_of
 from pushplan.core import control
 from pushplan.core import pushing as core
+from pushplan.geometry import gyration_squares
 from pushplan.geometry.obstacles import obstacles_of
 from pushplan.planners.pushing.bumper import faces_of
 from pushplan.planners.pushing.parameters import PushingConfig
 from pushplan.planners.pushing.push_model import PushModel, PushState
-from pushplan.world import Drive, InvalidInputError, Plan, RobotModel, Twist, World
+from pushplan.world import Drive, InvalidInputError, Movables, Plan, RobotModel, Twist, World
 from pushplan.world.checks import FloatArray, IntArray, expect
 from pushplan.world.outline import convex_outline, flatten
 
@@ -167,7 +168,8 @@ class PushingMpc:
         parameters = self.config.parameters
         self._plan = plan
         self._track = track_of(plan)
-        self._models = [PushModel(world.robot, outline, parameters, face) for face in faces]
+        radius = _radius_of_compound(world.movables, k)
+        self._models = [PushModel(world.robot, outline, parameters, face, radius) for face in faces]
         self._tracker.begin(
             [
                 _face(model, score, self.config)
@@ -176,6 +178,13 @@ class PushingMpc:
             _clearance(world.robot, self._models[0], self.config),
             float(world.robot_pose[2] - world.movables.poses[k, 2]),
         )
+
+
+def _radius_of_compound(movables: Movables, k: int) -> float | None:
+    """The radius of gyration of an object that is more than its outline [m]; None for others."""
+    if len(movables.parts(k)) == 1 and movables.gyration_radii[k] == 0.0:
+        return None
+    return math.sqrt(gyration_squares(movables.select([k]))[0])
 
 
 def groups_of(horizon: int, moves: int) -> IntArray:

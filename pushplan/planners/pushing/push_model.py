@@ -65,9 +65,13 @@ class PushModel:
         outline: (N, 2) convex corners of the box, from its centroid [m].
         parameters: friction.
         face: which side is pushed; the one that faces -x if None.
+        radius: c, the greatest torque over the greatest force of the ground under uniform pressure
+            [m]; that under the outline if None. Where it is given, the centre of pressure is the
+            origin of the outline, which may be the hull of something else.
 
     Raises:
-        InvalidInputError: if the outline is not convex or its centroid not at its origin.
+        InvalidInputError: if the outline is not convex, or its centroid is not at its origin and
+            there is no radius.
     """
 
     def __init__(
@@ -76,14 +80,17 @@ class PushModel:
         outline: ArrayLike,
         parameters: PushParameters | None = None,
         face: Face | None = None,
+        radius: float | None = None,
     ) -> None:
         self.bumper = robot if isinstance(robot, Bumper) else Bumper.of(robot)
         self.outline = convex_outline("outline", outline)
         middle = centroid(self.outline)
-        if np.abs(middle).max() > 1e-6 * np.abs(self.outline).max():
+        if radius is None and np.abs(middle).max() > 1e-6 * np.abs(self.outline).max():
             raise InvalidInputError(
                 f"outline must have its centroid at the origin, got {middle.tolist()}"
             )
+        if radius is None:
+            radius = _radius(self.outline.tobytes())
         self.parameters = PushParameters() if parameters is None else parameters
         expect("parameters", self.parameters, PushParameters)
         self.face = face_towards(self.outline, 0.0) if face is None else face
@@ -95,7 +102,7 @@ class PushModel:
             self.face.depth,
             self.face.low,
             self.face.high,
-            self.parameters.spread * _radius(self.outline.tobytes()),
+            self.parameters.spread * number("radius", radius, low=0.0, open_low=True),
             self.parameters.friction,
         )
 
