@@ -80,6 +80,8 @@ VALID: dict[str, Any] = {
     "hull_offsets": OFFSETS,
     "wall_offsets": OFFSETS,
     "part_offsets": OFFSETS,
+    "part_vertices": SQUARES,
+    "first_parts": [0, 1, 2],
     "block_offsets": OFFSETS,
     "neighbour_offsets": [0, 1, 2],
     "neighbours": [1, 0],

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 from collections.abc import Sequence
+from typing import TextIO
 
 from pushplan.cli.parser import build_parser, current_spelling, fail, named
 
@@ -37,7 +39,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         os.environ[TRUST_VARIABLE] = "1"  # where worker processes see it too
     try:
-        code: int = named(options.run)(options)
+        with warnings.catch_warnings():
+            warnings.showwarning = _show_in_a_line
+            code: int = named(options.run)(options)
         sys.stdout.flush()  # a full disk or a closed pipe is reported here, or nowhere
         return code
     except KeyboardInterrupt:
@@ -63,3 +67,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if isinstance(error, OSError) and error.strerror and error.filename is not None:
             text = f"{error.filename!r}: {error.strerror}"  # without the system's number
         return fail(text, 2 if isinstance(error, users) else 1)
+
+
+def _show_in_a_line(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    """Write a warning to standard error: of ours its message, which is for the user."""
+    text = f"pushplan: note: {message}\n"
+    if not category.__module__.startswith("pushplan."):
+        text = warnings.formatwarning(message, category, filename, lineno, line)
+    (file or sys.stderr).write(text)

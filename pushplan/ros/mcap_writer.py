@@ -103,7 +103,9 @@ class McapWriter:
             object_poses=objects.poses.ravel(),
             new_objects=json.dumps([described[k] for k in new]),
         )
-        outlines = {number: objects.parts(k) for k, number in enumerate(ids)}
+        outlines: dict[int, Sequence[FloatArray]] = {
+            number: objects.parts(k) for k, number in enumerate(ids)
+        }
         changed = [
             k
             for k, number in enumerate(ids)

@@ -8,7 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from pushplan.world.checks import ArrayRecord, FloatArray, checked_bounds, frozen
-from pushplan.world.convex_shapes import ConvexParts, areas_and_centres, disjoint, shapes_of
+from pushplan.world.convex_shapes import areas_and_centres, disjoint, shapes_of
+from pushplan.world.outline import ConvexParts
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,9 +18,9 @@ from pushplan.files.safe_files import known_keys, read_data, read_npy, read_npz
 from pushplan.geometry import convex_penetration
 from pushplan.scenarios.ice_field import IceField
 from pushplan.world import InvalidInputError, SchemaError
-from pushplan.world.checks import FloatArray, IntArray, array, checked_bounds, expect
-from pushplan.world.convex_shapes import ConvexParts, shapes_of
-from pushplan.world.outline import convex_hull, flatten, outline_boxes
+from pushplan.world.checks import BoolArray, FloatArray, IntArray, array, checked_bounds, expect
+from pushplan.world.convex_shapes import hull_of, listed_corners, shapes_of
+from pushplan.world.outline import ConvexParts, flatten, outline_boxes
 from pushplan.world.outline_repair import OutlineWarning
 
 SCHEMA = "pushplan-ice/1"
@@ -75,9 +75,11 @@ def load_ice(path: str | Path, *, hull: bool = False, overlaps: bool = False) ->
         raise SchemaError(f"{path}: {error}") from error
     try:
         floes = _floes(polygons, hull)
-        field = IceField(floes, _bounds(floes, bounds))
+        field = IceField(tuple(floes), _bounds(floes, bounds))
         _check_inside(field)
-        return field if overlaps else _apart(field, is_bounded=bounds is not None)
+        if not overlaps:
+            field = _apart(field, is_bounded=bounds is not None)
+        return field
     except InvalidInputError as error:
         raise InvalidInputError(f"{path}: {error}") from error
 
@@ -95,12 +97,16 @@ def save_ice(field: IceField, path: str | Path) -> None:
             data = {
                 "schema": SCHEMA,
                 "bounds": field.bounds.tolist(),
-                "polygons": [_listed(parts) for parts in field.floes],
+                "polygons": [listed_corners(parts) for parts in field.floes],
             }
             path.write_text(json.dumps(data) + "\n", encoding="utf-8")
         elif ending == ".npz":
             vertices, offsets = flatten([part for parts in field.floes for part in parts])
-            arrays = {"vertices": vertices, "offsets": offsets, "bounds": field.bounds}
+            arrays: dict[str, Any] = {
+                "vertices": vertices,
+                "offsets": offsets,
+                "bounds": field.bounds,
+            }
             if len(offsets) != len(field) + 1:
                 arrays["first_parts"] = np.cumsum([0, *map(len, field.floes)])
             with path.open("wb") as file:
@@ -111,10 +117,6 @@ def save_ice(field: IceField, path: str | Path) -> None:
             )
     except OSError as error:
         raise InvalidInputError(f"cannot write {path}: {error}") from error
-
-
-def _listed(parts: ConvexParts) -> list[Any]:
-    return parts[0].tolist() if len(parts) == 1 else [part.tolist() for part in parts]
 
 
 def _path(path: object) -> Path:
@@ -163,7 +165,7 @@ def _read_npz(path: Path) -> tuple[Sequence[Any], object]:
     return _groups(path, "first_parts", arrays["first_parts"], parts, "parts"), arrays.get("bounds")
 
 
-def _groups(path: Path, name: str, starts: object, items: Any, what: str) -> list[Any]:
+def _groups(path: Path, name: str, starts: Any, items: Any, what: str) -> list[Any]:
     """Consecutive items, grouped by where each group starts."""
     offsets: IntArray = array(name, starts, (None,), dtype=np.int64)
     rises = len(offsets) > 0 and offsets[0] == 0 and (np.diff(offsets) >= 0).all()
@@ -188,7 +190,7 @@ def _floes(polygons: Sequence[Any], hull: bool) -> list[ConvexParts]:
     floes = shapes_of("polygon", polygons)
     if not hull:
         return floes
-    return [parts if len(parts) == 1 else (convex_hull(np.concatenate(parts)),) for parts in floes]
+    return [(hull_of(parts),) for parts in floes]
 
 
 def _bounds(floes: Sequence[ConvexParts], bounds: object) -> FloatArray:
@@ -241,7 +243,7 @@ def _apart(field: IceField, is_bounded: bool) -> IceField:
             f"pairs, polygons {a} and {b} still overlap by {depth:.3g} m; overlaps=True "
             "(--overlaps, the variation ice_overlaps) leaves them as they are"
         )
-    moved = shifts.any(axis=1)
+    moved: BoolArray = (shifts != 0.0).any(axis=1)
     if not moved.any():
         return field
     ways = np.hypot(*shifts.T)

@@ -106,7 +106,7 @@ def _pack(
         floes = _grow(areas, wanted, sizes, *shapes, centres, radii, water)
         reached = sum(geometry.polygon_area(floe) for floe in floes)
         if reached >= wanted:
-            return IceField(_shrunk(floes, wanted / reached), box)
+            return IceField(tuple((floe,) for floe in _shrunk(floes, wanted / reached)), box)
         best = max(best, reached)
     reached_words = ""
     if best:

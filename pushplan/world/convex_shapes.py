@@ -9,10 +9,14 @@ import numpy as np
 
 from pushplan.errors import InvalidInputError
 from pushplan.world.checks import FloatArray
-from pushplan.world.outline import areas_and_centroids, convex_outlines, flatten, listed
-
-ConvexParts = tuple[FloatArray, ...]
-"""Convex outlines, counter-clockwise, each (N, 2) [m]; the shape is their union."""
+from pushplan.world.outline import (
+    ConvexParts,
+    areas_and_centroids,
+    convex_hull,
+    convex_outlines,
+    flatten,
+    listed,
+)
 
 
 def shapes_of(
@@ -31,15 +35,32 @@ def shapes_of(
         InvalidInputError: as `pushplan.world.outline_repair.outline_parts`.
     """
     try:  # nearly always
-        single = [
-            shape[0] if isinstance(shape, tuple) and len(shape) == 1 else shape
-            for shape in listed(name, shapes)
-        ]
+        single = [_unpacked(shape) for shape in listed(name, shapes)]
         return [(outline,) for outline in convex_outlines(name, single)]
     except InvalidInputError:
         from pushplan.world.outline_repair import cut_outlines
 
         return cut_outlines(name, shapes, called or (lambda i: f"{name} {i}"))
+
+
+def _unpacked(shape: Any) -> Any:
+    """The outline in a tuple of one."""
+    if isinstance(shape, tuple) and len(shape) == 1:
+        return shape[0]
+    return shape
+
+
+def hull_of(parts: ConvexParts) -> FloatArray:
+    """(N, 2) convex hull of a shape [m]."""
+    if len(parts) == 1:
+        return parts[0]
+    return convex_hull(np.concatenate(parts))
+
+
+def listed_corners(parts: ConvexParts) -> list[Any]:
+    """The corners of a shape as lists, ready for a file; of several parts one list each."""
+    corners = [part.tolist() for part in parts]
+    return corners if len(corners) > 1 else corners[0]
 
 
 def disjoint(parts: ConvexParts) -> ConvexParts:

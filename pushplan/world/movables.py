@@ -22,17 +22,11 @@ from pushplan.world.checks import (
     frozen,
     number,
 )
-from pushplan.world.convex_shapes import (
-    ConvexParts,
-    areas_and_centres,
-    disjoint,
-    rings_of,
-    shapes_of,
-)
+from pushplan.world.convex_shapes import areas_and_centres, disjoint, hull_of, rings_of, shapes_of
 from pushplan.world.outline import (
     LARGEST_M,
+    ConvexParts,
     areas_and_centroids,
-    convex_hull,
     convex_outline,
     flatten,
     grown_outlines,
@@ -180,7 +174,7 @@ class Movables(ArrayRecord, CheckedFields):
         Args:
             outlines: K outlines as drawn: (N, 2) corners [m], a polygon of Shapely or a list of
                 either, whose union is the object. What is not convex is cut into convex parts,
-                and repaired if need be; see `pushplan.world.outline_parts`.
+                and repaired if need be; see `pushplan.world.outline_repair`.
             poses: (K, 3) x, y [m], theta [rad].
             masses: (K,) [kg]; by default area times ``density``.
             density: [kg/m²].
@@ -257,11 +251,7 @@ class Movables(ArrayRecord, CheckedFields):
     def _contact_hulls(self) -> tuple[FloatArray, IntArray]:
         if not self.is_compound:
             return self._contact_parts
-        hulls = [
-            parts[0] if len(parts) == 1 else convex_hull(np.concatenate(parts))
-            for parts in map(self.parts, range(len(self)))
-        ]
-        return flatten(hulls)
+        return flatten([hull_of(self.parts(k)) for k in range(len(self))])
 
     @property
     def part_vertices(self) -> FloatArray:
@@ -371,7 +361,10 @@ class Movables(ArrayRecord, CheckedFields):
     def contact_areas(self) -> FloatArray:
         """(K,) areas of the objects as others touch them, the sums of those of their parts [m²]."""
         areas, _ = areas_and_centroids(self.part_vertices, self.part_offsets)
-        return areas if not self.is_compound else np.add.reduceat(areas, self.first_parts[:-1])
+        if not self.is_compound:
+            return areas
+        sums: FloatArray = np.add.reduceat(areas, self.first_parts[:-1])
+        return sums
 
     def moved_to(self, poses: ArrayLike, twists: ArrayLike | None = None) -> Movables:
         """The same objects at other poses (K, 3); at rest unless twists (K, 3) are given.

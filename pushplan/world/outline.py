@@ -12,6 +12,9 @@ from numpy.typing import ArrayLike
 from pushplan.errors import InvalidInputError, short
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, array, frozen
 
+ConvexParts = tuple[FloatArray, ...]
+"""Convex outlines, counter-clockwise, each (N, 2) [m]; the shape is their union."""
+
 LARGEST_M = 1e70
 """Greatest coordinate [m]: its fourth power is finite still."""
 
@@ -69,7 +72,7 @@ def convex_outline(name: str, corners: ArrayLike) -> FloatArray:
 
     The corners may go round either way, and the first may be repeated at the end. An outline that
     breaks a rule only by rounding is mended: corners that are repeated, or that rounding has put
-    inside, are left out. See `rounding_of`.
+    inside, are left out. See `_rounding`.
 
     Raises:
         InvalidInputError: fewer than 3 corners, no area, or not convex.
@@ -83,7 +86,7 @@ def convex_outline(name: str, corners: ArrayLike) -> FloatArray:
     ring = counter_clockwise(points)
     if _is_well_formed(ring):
         return ring
-    rounding = rounding_of(points)
+    rounding = _rounding(points)
     steps = np.roll(points, -1, axis=0) - points
     lengths = np.hypot(steps[:, 0], steps[:, 1])
     for least in (1e-3 * rounding, rounding):  # a closed ring is not to lose its short edges
@@ -127,7 +130,7 @@ def _without_dents(name: str, ring: FloatArray, rounding: float) -> FloatArray:
     return spanning
 
 
-def rounding_of(points: FloatArray) -> float:
+def _rounding(points: FloatArray) -> float:
     """Distance [m] that counts as rounding in an outline.
 
     A millionth of its size, and four times what float32 loses of its greatest coordinate; at most

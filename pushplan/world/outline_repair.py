@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import heapq
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -13,14 +12,13 @@ import shapely
 
 from pushplan.errors import InvalidInputError
 from pushplan.world.checks import FloatArray, array
-from pushplan.world.convex_shapes import ConvexParts
 from pushplan.world.outline import (
     LARGEST_M,
+    ConvexParts,
     convex_hull,
     convex_outline,
     counter_clockwise,
     listed,
-    rounding_of,
 )
 
 MOST_CHANGE = 0.01
@@ -159,7 +157,7 @@ def _polygon(name: str, shape: Any) -> Any:
     if isinstance(shape, shapely.Geometry):
         return shape
     steps = np.roll(points, -1, axis=0) - points
-    kept = points[np.hypot(*steps.T) > rounding_of(points)]
+    kept = points[np.hypot(*steps.T) > 1e-9 * float(np.ptp(points, axis=0).max())]
     if len(kept) < 3:
         raise InvalidInputError(f"{name} must have at least 3 corners that differ")
     return shapely.Polygon(kept)
@@ -210,27 +208,24 @@ def _merged(pieces: list[FloatArray], budget: float) -> list[FloatArray]:
     parts = dict(enumerate(pieces))
     areas = {i: shapely.Polygon(piece).area for i, piece in parts.items()}
     neighbours = _neighbours(pieces)
-    queue: list[tuple[float, int, int]] = []
+    gains: dict[tuple[int, int], float] = {}  # area beyond theirs of the hull of two neighbours
 
     def offer(pairs: Iterable[tuple[int, int]]) -> None:
         for i, j in pairs:
             hull = convex_hull(np.concatenate([parts[i], parts[j]]))
-            gain = shapely.Polygon(hull).area - areas[i] - areas[j]
-            heapq.heappush(queue, (gain, i, j))
+            gains[i, j] = shapely.Polygon(hull).area - areas[i] - areas[j]
 
     offer((i, j) for i in parts for j in neighbours[i] if i < j)
-    while queue:
-        gain, i, j = heapq.heappop(queue)
-        if i not in parts or j not in parts:
-            continue
-        if gain > budget:
+    while gains:
+        i, j = min(gains, key=lambda pair: (gains[pair], pair))
+        if gains[i, j] > budget:
             break
-        budget -= max(gain, 0.0)
-        new = len(pieces) + len(areas)
-        hull = convex_hull(np.concatenate([parts.pop(i), parts.pop(j)]))
-        parts[new] = hull
-        areas[new] = shapely.Polygon(hull).area
+        budget -= max(gains[i, j], 0.0)
+        new = len(areas)
+        parts[new] = convex_hull(np.concatenate([parts.pop(i), parts.pop(j)]))
+        areas[new] = shapely.Polygon(parts[new]).area
         neighbours[new] = {k for k in neighbours[i] | neighbours[j] if k in parts}
+        gains = {pair: gain for pair, gain in gains.items() if not {i, j} & set(pair)}
         for k in neighbours[new]:
             neighbours[k].add(new)
         offer((k, new) for k in sorted(neighbours[new]))

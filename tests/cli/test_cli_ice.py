@@ -69,9 +69,12 @@ def test_help_has_examples(capsys: pytest.CaptureFixture[str]) -> None:
 def test_floes_as_a_camera_sees_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     seen, clean = tmp_path / "seen.json", tmp_path / "clean.json"
     seen.write_text("[[[0,0],[2,0],[1,0.5],[2,2],[0,2]], [[1.9,0],[3,0],[3,2],[1.9,2],[1.9,0]]]")
-    for given, way_on in (([], "--hull"), (["--hull"], "--overlaps")):
-        assert main(["ice", str(seen), *given]) == 2
-        assert way_on in capsys.readouterr().err
+    assert main(["ice", str(seen)]) == 0
+    told = capsys.readouterr()
+    assert told.err.startswith(
+        "pushplan: note: 1 pairs of floes overlapped: 2 of 2 floes were moved"
+    )
+    assert told.err.count("\n") == 1 and told.out.startswith("2 floes")
     for given in ([str(seen)], ["--check", str(seen)]):
         assert main(["ice", *given, "--hull", "--overlaps", "--out", str(clean)]) == 0
         assert capsys.readouterr().out.startswith("2 floes, concentration 103.33 %")

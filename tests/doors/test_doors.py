@@ -41,6 +41,7 @@ STRUCTURED = ("world-json", "scenarios", "ice-json", "map-yaml", "training", "sp
 
 
 @pytest.mark.filterwarnings("error")  # nothing is said beside the one line
+@pytest.mark.filterwarnings("ignore::pushplan.world.outline_repair.OutlineWarning")
 @pytest.mark.parametrize("name", STRUCTURED)
 def test_any_value_of_any_key_may_be_wrong(name: str, tmp_path: Path) -> None:
     path, good = DOORS[name].make(tmp_path)

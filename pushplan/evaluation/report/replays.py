@@ -105,7 +105,7 @@ def _scene(episode: Episode) -> dict[str, Any]:
 
 
 def _drawn(objects: Movables, k: int) -> dict[str, Any]:
-    """What is filled of an object, and the lines around it."""
+    """The polygons that are filled for an object, and the lines around them."""
     return {
         "parts": [_flat(part) for part in objects.parts(k)],
         "rings": [_flat(ring) for ring in objects.rings(k)],

@@ -15,7 +15,12 @@ from pushplan.errors import InvalidInputError, SchemaError, short, unknown_name_
 from pushplan.files.safe_files import known_keys, read_data
 from pushplan.files.safe_yaml import dump
 from pushplan.world.checks import array, boolean, integer, number, word
-from pushplan.world.convex_shapes import ConvexParts, areas_and_centres, disjoint, shapes_of
+from pushplan.world.convex_shapes import (
+    areas_and_centres,
+    disjoint,
+    listed_corners,
+    shapes_of,
+)
 from pushplan.world.goals import ClearanceArea, Goal, GoalDisc, GoalLine, Receptacle
 from pushplan.world.movables import Movables
 from pushplan.world.robot import RobotModel
@@ -37,8 +42,6 @@ _LEFT_OUT = {
     "max_turn_acceleration": math.inf,
     "contact_radius": 0.0,
     "wheel_parts": 0,
-    "outline": None,
-    "parts": None,
     "gyration_radius": 0.0,
     "fixed": False,
     "margin": 0.0,
@@ -63,15 +66,19 @@ def world_to_dict(world: World) -> dict[str, Any]:
         "id": objects.ids,
         "pose": objects.poses,
         "twist": objects.twists,
-        "outline": [_one_or_none(objects.drawn_parts(k)) for k in range(len(objects))],
-        "parts": [_if_several(objects.drawn_parts(k)) for k in range(len(objects))],
+        "outline": [listed_corners(objects.drawn_parts(k)) for k in range(len(objects))],
         "contact_radius": objects.contact_radii,
         "gyration_radius": objects.gyration_radii,
         "mass": objects.masses,
         "wheeled": objects.wheeled,
         "fixed": objects.fixed,
     }
-    rows = zip(*map(_plain, columns.values()), strict=True)
+    rows = [
+        dict(zip(columns, row, strict=True))
+        for row in zip(*map(_plain, columns.values()), strict=True)
+    ]
+    for k in np.flatnonzero(np.diff(objects.first_parts) > 1).tolist():
+        rows[k]["parts"] = rows[k].pop("outline")
     static = {
         "bounds": _plain(world.static.bounds),
         "polygons": _plain(world.static.polygons),
@@ -89,7 +96,7 @@ def world_to_dict(world: World) -> dict[str, Any]:
             "margin": world.margin,
             "robot": _written(robot),
             "static": static,
-            "movables": [_written(dict(zip(columns, row, strict=True))) for row in rows],
+            "movables": [_written(row) for row in rows],
             "goal": {"kind": kind, **{key: _plain(getattr(goal, key)) for key in keys}},
         }
     )
@@ -102,20 +109,8 @@ def _plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 
-def _one_or_none(parts: ConvexParts) -> Any:
-    return parts[0].tolist() if len(parts) == 1 else None
-
-
-def _if_several(parts: ConvexParts) -> Any:
-    return [part.tolist() for part in parts] if len(parts) > 1 else None
-
-
 def _written(values: dict[str, Any]) -> dict[str, Any]:
-    return {
-        key: value
-        for key, value in values.items()
-        if key not in _LEFT_OUT or value != _LEFT_OUT[key]
-    }
+    return {key: value for key, value in values.items() if value != _LEFT_OUT.get(key)}
 
 
 def world_from_dict(data: object, folder: str | Path = ".") -> World:
