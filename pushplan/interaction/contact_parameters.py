@@ -28,7 +28,7 @@ from pushplan.world.outline import convex_outline
 
 SUPPORTS = ("unknown", "evenly", "corners")
 """Ways to stand on the ground: not known, with even pressure, on the corners of the outline."""
-_UNKNOWN_SPREAD = 0.5  # of the logarithm of a value that nobody has measured: a factor of 1.65
+_UNKNOWN_SPREADS = (0.4, 0.5, 0.4)  # of the logarithms of what nobody has measured
 _KNOWN_SPREAD = 0.15  # of that of a gyration computed from the support
 _LEAST_SPREAD = 0.2  # of that of a friction from a table: surfaces differ
 _PARTS_OF_AN_EDGE = 16
@@ -39,7 +39,8 @@ _LEFT_OVER = 0.1  # of the inscribed radius of a part that is shrunk [1]
 class ContactParameters(ArrayRecord, CheckedFields):
     """Parameters of `QuasiStatic`, with the covariance of their logarithms.
 
-    The defaults are wide: 0.35 times or over 1.65 holds half of the dry pairs of ``materials.yaml``.
+    The defaults are wide: friction has the mean and the spread of the pairs of ``materials.yaml``
+    without ice, Teflon and rubber.
 
     Args:
         friction: Coulomb coefficient between robot and objects.
@@ -58,11 +59,11 @@ class ContactParameters(ArrayRecord, CheckedFields):
         InvalidInputError: if a value is out of range.
     """
 
-    friction: PositiveFloat = 0.35
+    friction: PositiveFloat = 0.43
     gyration_scale: PositiveFloat = 1.0
-    static_friction: PositiveFloat = 0.35
+    static_friction: PositiveFloat = 0.43
     log_covariance: Annotated[FloatArray, Shape(3, 3)] = field(
-        default_factory=lambda: np.eye(3) * _UNKNOWN_SPREAD**2
+        default_factory=lambda: np.diag(np.square(_UNKNOWN_SPREADS))
     )
     overlap: float = 0.0
     overlap_deviation: NonNegativeFloat = 0.0
@@ -91,7 +92,7 @@ class ContactParameters(ArrayRecord, CheckedFields):
             InvalidInputError: if there is no such support.
         """
         friction = cls.friction
-        spreads = [_UNKNOWN_SPREAD] * 3
+        spreads = [*_UNKNOWN_SPREADS]
         if materials is not None:
             least, greatest = _friction_range(materials)
             friction = math.sqrt(least * greatest)
@@ -122,8 +123,13 @@ class ContactParameters(ArrayRecord, CheckedFields):
         logs = rng.multivariate_normal(
             np.log(self.values), self.log_covariance, integer("count", count, low=0)
         )
-        none = np.zeros((3, 3))
-        return [replace(self, **_named(np.exp(row)), log_covariance=none) for row in logs]
+        drawn = []
+        for friction, scale, static_friction in np.exp(logs).tolist():
+            one = replace(self, friction=friction, gyration_scale=scale)
+            drawn.append(
+                replace(one, static_friction=static_friction, log_covariance=np.zeros((3, 3)))
+            )
+        return drawn
 
     @property
     def values(self) -> FloatArray:
@@ -170,11 +176,6 @@ class ContactParameters(ArrayRecord, CheckedFields):
         names = tuple(one.name for one in fields(cls))
         known_keys(str(path), data, names, names)
         return cls(**data)
-
-
-def _named(values: FloatArray) -> dict[str, float]:
-    names = ("friction", "gyration_scale", "static_friction")
-    return dict(zip(names, values.tolist(), strict=True))
 
 
 @cache

@@ -25,7 +25,7 @@ _LEAST_DEVIATION = 0.02  # of a round's draws, of the logarithms
 _STEPS_PER_RADIUS = 400.0  # of the predictions: small beside the misses of real pushes
 _ROUNDING_M = 2e-4  # of logged places: zigzag of that size would reverse friction at each step
 _EXACT = 1e-3  # miss of a perfect prediction, in radii of gyration
-_COORDINATES = 3  # that are observed of an end: x, y, heading
+_COORDINATES = 2.0  # that count of an end's three, which go wrong together
 _FEWEST = 3  # ends from which an overlap is taken
 _FAR = 0.1  # gap after which a robot counts as having left the object, in radii of the object
 
@@ -72,7 +72,7 @@ class ObservedPush(ArrayRecord, CheckedFields):
         if static is None:
             static = StaticMap.build(bounds=(*(start[:2] - 1e4), *(start[:2] + 1e4)))
         objects = Movables.from_outlines([self.outline], [self.object_before])
-        goal = GoalDisc((float(start[0]), float(start[1])), 1.0)
+        goal = GoalDisc(start[:2], 1.0)  # a world needs one
         return World(self.robot, start, static, objects, goal)
 
     def path(self) -> FloatArray:
@@ -148,12 +148,15 @@ def identify(
     total[:free, free:] = total[free:, :free] = 0.0
     best = np.append(found, mean[free:])
     values = np.exp(best)
+    friction, scale, static_friction = values.tolist()
     return ContactParameters(
-        *values.tolist(),
+        friction=friction,
+        gyration_scale=scale,
+        static_friction=static_friction,
         log_covariance=total,
         overlap=overlap,
         overlap_deviation=deviation,
-        miss=float(misses.of(*values.tolist()).mean()),
+        miss=float(misses.of(friction, scale, static_friction).mean()),
         pushes=len(pushes),
         saw_walls=free == 3,
     )
