@@ -3,6 +3,7 @@
 from pushplan.interaction.contact_parameters import ContactParameters, support_gyration
 from pushplan.interaction.identification import ObservedPush, identify
 from pushplan.interaction.interaction_model import Interaction, InteractionModel, SweepsMany
+from pushplan.interaction.logged_pushes import find_pushes
 from pushplan.interaction.quasi_static import QuasiStatic
 
 __all__ = [
@@ -12,6 +13,7 @@ __all__ = [
     "ObservedPush",
     "QuasiStatic",
     "SweepsMany",
+    "find_pushes",
     "identify",
     "support_gyration",
 ]

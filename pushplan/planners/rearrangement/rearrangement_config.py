@@ -15,6 +15,7 @@ from pushplan.world.checked_fields import (
     NonNegativeFloat,
     NonNegativeInt,
     OneOf,
+    PositiveFloat,
     PositiveInt,
 )
 
@@ -78,6 +79,8 @@ class RearrangementConfig(CheckedFields):
             an object as heavy as the robot: the w of J = l_0 + w sum(m_i l_i) / m_0.
         friction: Coulomb coefficient between robot and objects, for the prediction.
         static_friction: the same between objects and walls.
+        gyration_scale: factor on the radius of the objects' limit surface; see
+            `pushplan.interaction.QuasiStatic`.
         later_fraction: of the cost of contacts in those, as objects will have gone by then.
         contact_cost: least cost of carrying an object along on an approach, however light it is.
         target_cost: what is added to it for the object that is to be pushed.
@@ -106,6 +109,7 @@ class RearrangementConfig(CheckedFields):
     work_weight: Annotated[float, Limits(0.0, 1e6)] = 12.0
     friction: Annotated[float, Limits(0.0, 1e6)] = 0.2
     static_friction: Annotated[float, Limits(0.0, 1e6)] = 0.0
+    gyration_scale: PositiveFloat = 1.0
     later_fraction: Fraction = 0.5
     contact_cost: Annotated[float, Limits(0.0, 1e6)] = 1.0
     target_cost: NonNegativeFloat = 5.0
