@@ -144,7 +144,7 @@ def measure(path: Path, splits: int, train: int, simulators: bool) -> PushSet:
     """Predict the pushes of a file in every way."""
     pushes, points = read_pushes(path)
     blind = ContactParameters()
-    known = ContactParameters.prior(support=points if len(points) else "evenly", outline=BLOCK)
+    known = ContactParameters.prior(outline=BLOCK, support=points if len(points) else "evenly")
     scale = known.gyration_scale
     errors = {
         "no motion": mean_error(pushes, stays),

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass, field, fields, replace
-from functools import cache
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -26,34 +24,32 @@ from pushplan.world.checked_fields import (
 from pushplan.world.checks import ArrayRecord, FloatArray, array, choice, integer
 from pushplan.world.outline import convex_outline
 
-SUPPORTS = ("unknown", "evenly", "corners")
-"""Ways to stand on the ground: not known, with even pressure, on the corners of the outline."""
-_UNKNOWN_SPREADS = (0.4, 0.5, 0.4)  # of the logarithms of what nobody has measured
-_KNOWN_SPREAD = 0.15  # of that of a gyration computed from the support
-_LEAST_SPREAD = 0.2  # of that of a friction from a table: surfaces differ
-_PARTS_OF_AN_EDGE = 16
-_LEFT_OVER = 0.1  # of the inscribed radius of a part that is shrunk [1]
+SPREADS = (0.4, 0.5, 0.4)
+"""Deviations of the logarithms of friction, gyration and friction at walls before a push."""
+_LEAST_SPREAD = 0.2  # of a friction from the table: surfaces of a material differ
+_SUPPORT_SPREAD = 0.15  # of a gyration from a known support
+_LEFT_OVER = 0.1  # of the inscribed radius of a part that is shrunk
+_LINES = 64  # from the origin to each edge, for the mean distance of an even pressure
 
 
 @dataclass(frozen=True, eq=False)
 class ContactParameters(ArrayRecord, CheckedFields):
     """Parameters of `QuasiStatic`, with the covariance of their logarithms.
 
-    The defaults are wide: friction has the mean and the spread of the pairs of ``materials.yaml``
-    without ice, Teflon and rubber.
+    By default friction has the mean and the spread of the pairs of ``materials.yaml`` without ice,
+    Teflon and rubber.
 
     Args:
         friction: Coulomb coefficient between robot and objects.
         gyration_scale: factor on the radius of the limit surface; see `QuasiStatic`.
         static_friction: Coulomb coefficient between objects and walls.
         log_covariance: (3, 3) of the logarithms of the three.
-        overlap: by how much the outlines of robot and object overlap where they are in contact, as
-            observed [m]; negative where a gap is seen. `fitted` corrects a robot by it.
+        overlap: by how much the observed outlines of robot and object overlap in contact [m],
+            negative for a gap; `fitted` corrects a robot by it.
         overlap_deviation: its standard deviation [m].
-        miss: mean distance between observed and predicted ends of the pushes, plus the radius of
-            gyration times the difference of the headings [m]; 0 where none was observed.
+        miss: mean `ObservedPush.miss` of the pushes [m].
         pushes: number of pushes that they were identified from.
-        saw_walls: friction at walls was observed; else `static_friction` is the prior's.
+        saw_walls: friction at walls was observed; else it is the prior's.
 
     Raises:
         InvalidInputError: if a value is out of range.
@@ -63,7 +59,7 @@ class ContactParameters(ArrayRecord, CheckedFields):
     gyration_scale: PositiveFloat = 1.0
     static_friction: PositiveFloat = 0.43
     log_covariance: Annotated[FloatArray, Shape(3, 3)] = field(
-        default_factory=lambda: np.diag(np.square(_UNKNOWN_SPREADS))
+        default_factory=lambda: np.diag(np.square(SPREADS))
     )
     overlap: float = 0.0
     overlap_deviation: NonNegativeFloat = 0.0
@@ -75,61 +71,48 @@ class ContactParameters(ArrayRecord, CheckedFields):
     def prior(
         cls,
         materials: str | None = None,
-        support: str | ArrayLike = "unknown",
         outline: ArrayLike | None = None,
+        support: str | ArrayLike = "evenly",
     ) -> ContactParameters:
         """What is known before the first push.
 
         Args:
             materials: of robot and object, as ``"metal on wood"``; any if None.
-            support: one of `SUPPORTS`, or (N, 2) points that the object stands on [m], in the body
-                frame.
-            outline: (N, 2) of the object in its body frame [m]; needed unless the support is
-                unknown.
+            outline: (V, 2) of an object whose support is known [m]; any support if None.
+            support: of that object; see `support_gyration`.
 
         Raises:
-            UnknownNameError: if the table has no such materials.
-            InvalidInputError: if there is no such support.
+            InvalidInputError: if the table has no such materials, or there is no such support.
         """
         friction = cls.friction
-        spreads = [*_UNKNOWN_SPREADS]
+        scale = 1.0
+        spreads = [*SPREADS]
         if materials is not None:
-            least, greatest = _friction_range(materials)
+            table = read_data(Path(__file__).with_name("materials.yaml"), "materials")
+            turned = " on ".join(reversed(str(materials).split(" on ")))
+            if turned in table:
+                materials = turned
+            least, greatest = table[choice("materials", materials, tuple(table))]["friction"]
             friction = math.sqrt(least * greatest)
             spreads[0] = max(math.log(greatest / least) / 4.0, _LEAST_SPREAD)
-        scale = 1.0
-        if not (isinstance(support, str) and choice("support", support, SUPPORTS) == "unknown"):
-            if outline is None:
-                raise InvalidInputError("a support needs the outline of the object")
+        if outline is not None:
             scale = support_gyration(outline, support)
-            spreads[1] = _KNOWN_SPREAD
-        return cls(friction, scale, friction, np.diag(np.square(spreads)))
+            spreads[1] = _SUPPORT_SPREAD
+        return cls(friction, scale, cls.static_friction, np.diag(np.square(spreads)))
 
-    def model(self, **settings: Any) -> QuasiStatic:
-        """The interaction model with these values.
-
-        Args:
-            settings: numerical settings of `QuasiStatic`.
-        """
-        return QuasiStatic(
-            friction=self.friction,
-            gyration_scale=self.gyration_scale,
-            static_friction=self.static_friction,
-            **settings,
-        )
+    def model(self) -> QuasiStatic:
+        """The interaction model with these values."""
+        return QuasiStatic(self.friction, self.gyration_scale, static_friction=self.static_friction)
 
     def samples(self, count: int, rng: np.random.Generator) -> list[ContactParameters]:
         """Parameters drawn from the distribution, each certain of itself."""
-        logs = rng.multivariate_normal(
-            np.log(self.values), self.log_covariance, integer("count", count, low=0)
-        )
-        drawn = []
-        for friction, scale, static_friction in np.exp(logs).tolist():
-            one = replace(self, friction=friction, gyration_scale=scale)
-            drawn.append(
-                replace(one, static_friction=static_friction, log_covariance=np.zeros((3, 3)))
-            )
-        return drawn
+        count = integer("count", count, low=0)
+        logs = rng.multivariate_normal(np.log(self.values), self.log_covariance, count)
+        certain = replace(self, log_covariance=np.zeros((3, 3)))
+        return [
+            replace(certain, friction=friction, gyration_scale=scale, static_friction=static)
+            for friction, scale, static in np.exp(logs).tolist()
+        ]
 
     @property
     def values(self) -> FloatArray:
@@ -138,36 +121,30 @@ class ContactParameters(ArrayRecord, CheckedFields):
 
     @property
     def deviations(self) -> FloatArray:
-        """(3,) their standard deviations."""
+        """(3,) standard deviations of the values."""
         return self.values * np.sqrt(np.diag(self.log_covariance))
 
     def fitted(self, robot: RobotModel) -> RobotModel:
-        """The robot with a footprint that touches objects where they were observed to be touched.
+        """The robot with a footprint that touches objects where they were felt to be touched.
 
         Each part shrinks by `overlap`, or grows, and keeps a tenth of its inscribed radius.
         """
         from shapely import Polygon, maximum_inscribed_circle
 
         parts = []
-        for part in robot.parts:
-            polygon = Polygon(part)
-            radius = maximum_inscribed_circle(polygon).length
-            by = min(self.overlap, (1.0 - _LEFT_OVER) * radius)
-            shrunk = polygon.buffer(-by, join_style="mitre")
-            parts.append(np.array(shrunk.exterior.coords)[:-1][::-1])
+        for part in map(Polygon, robot.parts):
+            by = min(self.overlap, (1.0 - _LEFT_OVER) * maximum_inscribed_circle(part).length)
+            shrunk = part.buffer(-by, join_style="mitre")
+            parts.append(np.array(shrunk.exterior.coords)[:-1])
         return replace(robot, parts=tuple(parts))
 
-    def save(self, path: str | Path) -> None:
-        """Write to a file of JSON, which `load` reads."""
-        Path(path).write_text(json.dumps(self.to_dict(), indent=1) + "\n", encoding="utf-8")
-
     def to_dict(self) -> dict[str, Any]:
-        """All fields as JSON has them."""
+        """All fields, as JSON has them."""
         return {**vars(self), "log_covariance": self.log_covariance.tolist()}
 
     @classmethod
     def load(cls, path: str | Path) -> ContactParameters:
-        """Read what `save` wrote.
+        """Read a file of `to_dict` as JSON, such as ``pushplan identify --json`` prints.
 
         Raises:
             SchemaError: if the file is missing, or holds something else.
@@ -178,59 +155,34 @@ class ContactParameters(ArrayRecord, CheckedFields):
         return cls(**data)
 
 
-@cache
-def _materials() -> dict[str, Any]:
-    table: dict[str, Any] = read_data(Path(__file__).with_name("materials.yaml"), "materials")
-    return table
+def support_gyration(outline: ArrayLike, support: str | ArrayLike = "evenly") -> float:
+    """The `gyration_scale` of an object from how it stands on the ground.
 
-
-def _friction_range(materials: str) -> tuple[float, float]:
-    """Least and greatest coefficient of a pair of materials, in any order."""
-    table = _materials()
-    turned = " on ".join(reversed(materials.split(" on ")))
-    if turned in table:
-        materials = turned
-    low, high = table[choice("materials", materials, tuple(table))]["friction"]
-    return low, high
-
-
-def support_gyration(outline: ArrayLike, support: str | ArrayLike) -> float:
-    """The scale of the gyration of an object from how it stands on the ground.
-
-    The radius of the limit surface is c = tau_max / f_max: the mean distance of the pressure from
-    its centre (Goyal, Ruina and Papadopoulos 1991). On three points the balance of moments gives
-    the pressure; on more, the one that is nearest to equal.
+    The radius of the limit surface is c = tau_max / f_max, the mean distance of the pressure from
+    its centre (Goyal, Ruina and Papadopoulos 1991). The balance of moments gives the pressure on
+    three points; on more it is the one nearest to equal.
 
     Args:
-        outline: (N, 2) in the body frame, whose origin is the centre of mass [m].
+        outline: (V, 2) in the body frame, whose origin is the centre of mass [m].
         support: ``"evenly"``, ``"corners"``, or (N, 2) points in the body frame [m].
 
     Raises:
-        InvalidInputError: if the object does not stand on these points, or the support is unknown.
+        InvalidInputError: if the object cannot stand on the points.
     """
     corners = convex_outline("outline", outline)
     inertia = math.sqrt(geometry.polygon_inertia(corners))
-    if isinstance(support, str):
-        if choice("support", support, SUPPORTS[1:]) == "evenly":
-            return _mean_distance(corners) / inertia
-        support = corners
-    points: FloatArray = array("support", support, (None, 2))
+    points: FloatArray = corners
+    if not isinstance(support, str):
+        points = array("support", support, (None, 2))
+    elif choice("support", support, ("evenly", "corners")) == "evenly":
+        following = np.roll(corners, -1, axis=0)
+        steps = (np.arange(_LINES) + 0.5)[:, None, None] / _LINES
+        along = np.linalg.norm(corners + steps * (following - corners), axis=2).mean(axis=0)
+        areas = corners[:, 0] * following[:, 1] - corners[:, 1] * following[:, 0]  # of triangles
+        return float(2.0 / 3.0 * areas @ along / areas.sum()) / inertia
     balance = np.vstack([points.T, np.ones(len(points))])
     equal = np.full(len(points), 1.0 / max(len(points), 1))
-    off = np.array([0.0, 0.0, 1.0]) - balance @ equal
-    weights = equal + np.linalg.pinv(balance) @ off
+    weights = equal + np.linalg.pinv(balance) @ ([0.0, 0.0, 1.0] - balance @ equal)
     if len(points) < 3 or weights.min() < 0.0 or not np.allclose(balance @ weights, [0, 0, 1]):
         raise InvalidInputError("support must hold points around the object's centre of mass")
-    return float(weights @ np.hypot(points[:, 0], points[:, 1])) / inertia
-
-
-def _mean_distance(corners: FloatArray) -> float:
-    """Mean distance of the points of an outline from the origin inside it [m]."""
-    nodes, weights = np.polynomial.legendre.leggauss(_PARTS_OF_AN_EDGE)
-    area = total = 0.0
-    for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-        twice = float(a[0] * b[1] - a[1] * b[0])  # area of the triangle with the origin
-        along = a + 0.5 * (nodes[:, None] + 1.0) * (b - a)
-        area += 0.5 * twice
-        total += twice / 3.0 * float(weights @ np.hypot(along[:, 0], along[:, 1])) / 2.0
-    return total / area
+    return float(weights @ np.linalg.norm(points, axis=1)) / inertia

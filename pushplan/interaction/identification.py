@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Annotated
 
 import numpy as np
 
-from pushplan.core import geometry
+from pushplan.core import geometry as core_geometry
 from pushplan.core import interaction as core
+from pushplan.geometry import convex_penetration
 from pushplan.interaction.contact_parameters import ContactParameters
 from pushplan.interaction.quasi_static import QuasiStatic
 from pushplan.world import GoalDisc, InvalidInputError, Movables, RobotModel, StaticMap, World
@@ -27,7 +29,7 @@ _ROUNDING_M = 2e-4  # of logged places: zigzag of that size would reverse fricti
 _EXACT = 1e-3  # miss of a perfect prediction, in radii of gyration
 _COORDINATES = 2.0  # that count of an end's three, which go wrong together
 _FEWEST = 3  # ends from which an overlap is taken
-_FAR = 0.1  # gap after which a robot counts as having left the object, in radii of the object
+_FAR = 0.2  # gap at which a robot has left the object, in radii of gyration
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +67,11 @@ class ObservedPush(ArrayRecord, CheckedFields):
                 f"push.robot_poses must hold at least two poses, got {len(self.robot_poses)}"
             )
 
+    @cached_property
+    def gyration(self) -> float:
+        """Radius of gyration of the outline [m]."""
+        return math.sqrt(core_geometry.polygon_inertia(self.outline))
+
     def world(self) -> World:
         """The scene before the push."""
         static = self.static
@@ -77,7 +84,14 @@ class ObservedPush(ArrayRecord, CheckedFields):
 
     def path(self) -> FloatArray:
         """(M, 3) robot poses without the zigzag of rounded coordinates."""
-        return _simplified(self.robot_poses, self.robot.circumscribed_radius)
+        from shapely import LineString
+
+        x, y, theta = self.robot_poses.T
+        reach = self.robot.circumscribed_radius  # the foremost point shows every turn as well
+        rows = np.arange(len(theta))
+        line = np.column_stack([x + reach * np.cos(theta), y + reach * np.sin(theta), rows])
+        kept = np.array(LineString(line).simplify(_ROUNDING_M, preserve_topology=False).coords)
+        return self.robot_poses[kept[:, 2].astype(np.int64)]
 
     def miss(self, end: FloatArray) -> float:
         """Distance of a predicted pose (3,) from `object_after` [m].
@@ -85,8 +99,7 @@ class ObservedPush(ArrayRecord, CheckedFields):
         The difference of the headings counts with the radius of gyration of the outline.
         """
         turn = math.remainder(float(end[2] - self.object_after[2]), math.tau)
-        distance = math.dist(end[:2], self.object_after[:2])
-        return distance + math.sqrt(geometry.polygon_inertia(self.outline)) * abs(turn)
+        return math.dist(end[:2], self.object_after[:2]) + self.gyration * abs(turn)
 
     def predicted(self, model: QuasiStatic) -> FloatArray:
         """(3,) pose of the object at the end by a model."""
@@ -115,48 +128,38 @@ def identify(
     if not pushes:
         raise InvalidInputError("pushes must hold at least one push, got none")
     prior = prior or ContactParameters()
-    overlap, deviation = _overlap(pushes)
-    start = ContactParameters(overlap=overlap)
-    misses = _Misses(pushes, start)
+    overlap, overlap_deviation = _overlap(pushes)
+    misses = _Misses(pushes, overlap)
     free = 3 if misses.depend_on_walls(prior) else 2
     rng = np.random.default_rng(0)
-    mean = np.log(prior.values)
-    spread = prior.log_covariance
+    start = np.log(prior.values)
+    mean = start[:free]
+    spread = prior.log_covariance[:free, :free]
+    proposals = [(mean, spread)]
     draws = np.zeros((0, free))
     heights = np.zeros(0)
-    densities = []
-    centre = mean[:free]
-    width = spread[:free, :free]
     for _ in range(_ROUNDS):
-        densities.append((centre, width))
-        root = np.linalg.cholesky(width)
-        new = centre + rng.standard_normal((_DRAWS, free)) @ root.T
-        values = np.exp(np.column_stack([new, np.full((_DRAWS, 3 - free), mean[free:])]))
-        height = [misses.log_likelihood(*row) for row in values.tolist()]
+        centre, width = proposals[-1]
+        new = centre + rng.standard_normal((_DRAWS, free)) @ np.linalg.cholesky(width).T
+        likely = [misses.log_likelihood(np.append(row, start[free:])) for row in new]
         draws = np.vstack([draws, new])
-        heights = np.append(heights, height + _log_normal(new, mean[:free], spread[:free, :free]))
-        mixture = np.logaddexp.reduce([_log_normal(draws, *one) for one in densities])
+        heights = np.append(heights, likely + _log_normal(new, mean, spread))
+        mixture = np.logaddexp.reduce([_log_normal(draws, *one) for one in proposals])
         weights = np.exp(heights - mixture - (heights - mixture).max())
         weights /= weights.sum()
         found = weights @ draws
         off = draws - found
         covariance = (weights[:, None] * off).T @ off
-        width = _WIDER**2 * covariance + _LEAST_DEVIATION**2 * np.eye(free)
-        centre = found
-    total = np.array(spread)
+        proposals.append((found, _WIDER**2 * covariance + _LEAST_DEVIATION**2 * np.eye(free)))
+    best = np.append(found, start[free:])
+    total = np.diag(np.diag(prior.log_covariance))
     total[:free, :free] = covariance
-    total[:free, free:] = total[free:, :free] = 0.0
-    best = np.append(found, mean[free:])
-    values = np.exp(best)
-    friction, scale, static_friction = values.tolist()
     return ContactParameters(
-        friction=friction,
-        gyration_scale=scale,
-        static_friction=static_friction,
-        log_covariance=total,
+        *np.exp(best).tolist(),
+        log_covariance=total,  # type: ignore[misc]
         overlap=overlap,
-        overlap_deviation=deviation,
-        miss=float(misses.of(friction, scale, static_friction).mean()),
+        overlap_deviation=overlap_deviation,
+        miss=float(misses.of(best).mean()),
         pushes=len(pushes),
         saw_walls=free == 3,
     )
@@ -165,54 +168,41 @@ def identify(
 class _Misses:
     """How far predicted ends of pushes are from the observed ones, as a function of parameters."""
 
-    def __init__(self, pushes: Sequence[ObservedPush], overlap: ContactParameters) -> None:
-        self._pushes = pushes
-        self._paths = [push.path() for push in pushes]
-        groups: dict[object, World] = {}  # pushes that share shapes and walls share a model
-        self._keys = []
+    def __init__(self, pushes: Sequence[ObservedPush], overlap: float) -> None:
+        robots: dict[int, RobotModel] = {}  # by identity: pushes that share one share its model
+        correction = ContactParameters(overlap=overlap)
+        self._scenes = []
         for push in pushes:
-            key = (id(push.robot), push.outline.tobytes(), id(push.static))
-            if key not in groups:
-                world = push.world()
-                groups[key] = World(
-                    overlap.fitted(world.robot),
-                    world.robot_pose,
-                    world.static,
-                    world.movables,
-                    world.goal,
-                )
-            self._keys.append(key)
-        self._groups = groups
-        lengths = [math.sqrt(geometry.polygon_inertia(push.outline)) for push in pushes]
-        self._exact = _EXACT * float(np.mean(lengths))
+            if id(push.robot) not in robots:
+                robots[id(push.robot)] = correction.fitted(push.robot)
+            world = replace(push.world(), robot=robots[id(push.robot)])
+            self._scenes.append((push, world, push.path()))
+        self._exact = _EXACT * float(np.mean([push.gyration for push in pushes]))
 
-    def of(self, friction: float, scale: float, static_friction: float) -> FloatArray:
-        """Return (P,) misses [m]."""
+    def of(self, logs: FloatArray) -> FloatArray:
+        """Return (P,) misses [m] for the logarithms (3,) of the parameters."""
+        friction, scale, static_friction = np.exp(logs).tolist()
         model = QuasiStatic(friction, scale, static_friction=static_friction)
-        compiled = {}
-        for key, world in self._groups.items():
+        found = np.empty(len(self._scenes))
+        for k, (push, world, path) in enumerate(self._scenes):
             step = float(world.movables.radii[0]) / _STEPS_PER_RADIUS
             settings = model.settings(world)._replace(max_step=step)
-            compiled[key] = core.QuasiStatic(model.bodies(world), *settings)
-        found = np.empty(len(self._pushes))
-        for k, (push, path) in enumerate(zip(self._pushes, self._paths, strict=True)):
             out = np.empty((len(path), 1, 3))
-            compiled[self._keys[k]].sweep(path, push.object_before[None].copy(), out)
-            found[k] = push.miss(out[-1, 0])
+            poses = world.movables.poses.copy()
+            core.QuasiStatic(model.bodies(world), *settings).sweep(path, poses, out)
+            found[k] = push.miss(poses[0])
         return found
 
-    def log_likelihood(self, *values: float) -> float:
+    def log_likelihood(self, logs: FloatArray) -> float:
         """Up to a constant: Laplace, with the scale integrated out."""
-        misses = self.of(*values) + self._exact
+        misses = self.of(logs) + self._exact
         return -_COORDINATES * len(misses) * math.log(float(misses.sum()))
 
     def depend_on_walls(self, prior: ContactParameters) -> bool:
         """Return True if friction at walls changes a prediction."""
-        if all(push.static is None for push in self._pushes):
-            return False
-        friction, scale, _ = prior.values.tolist()
-        change = np.abs(self.of(friction, scale, 0.0) - self.of(friction, scale, 1.0))
-        return bool(change.max() > self._exact)
+        logs = np.log(prior.values)
+        change = self.of(logs) - self.of(logs * [1.0, 1.0, 0.0])  # 0: a friction of 1
+        return bool(np.abs(change).max() > self._exact)
 
 
 def _log_normal(points: FloatArray, mean: FloatArray, covariance: FloatArray) -> FloatArray:
@@ -229,43 +219,11 @@ def _overlap(pushes: Sequence[ObservedPush]) -> tuple[float, float]:
     for push in pushes:
         outline = transform(push.object_after, push.outline)
         parts = [transform(push.robot_poses[-1], part) for part in push.robot.contact_parts]
-        gap = min(max(_gap(outline, part), _gap(part, outline)) for part in parts)
-        if gap < _FAR * float(np.hypot(*push.outline.T).max()):
-            found.append(-gap)
+        depth = max(convex_penetration(outline, part)[0] for part in parts)
+        if depth > -_FAR * push.gyration:
+            found.append(depth)
     if len(found) < _FEWEST:
         return 0.0, 0.0
     middle = float(np.median(found))
     spread = 1.4826 * float(np.median(np.abs(np.array(found) - middle)))
     return middle, 1.2533 * spread / math.sqrt(len(found))  # of a median of normal values
-
-
-def _gap(a: FloatArray, b: FloatArray) -> float:
-    """The widest gap from an edge of ``a`` to ``b`` [m]; both counter-clockwise."""
-    edges = np.roll(a, -1, axis=0) - a
-    normals = np.column_stack([edges[:, 1], -edges[:, 0]]) / np.hypot(*edges.T)[:, None]
-    distances = np.einsum("ek,evk->ev", normals, b[None] - a[:, None])
-    return float(distances.min(axis=1).max())
-
-
-def _simplified(poses: FloatArray, radius: float) -> FloatArray:
-    """Poses (N, 3) without those within a rounding of the straight line between others.
-
-    Douglas and Peucker 1973; headings count by the motion of a corner of the robot.
-    """
-    points = np.column_stack([poses[:, :2], radius * np.unwrap(poses[:, 2])])
-    kept = {0, len(points) - 1}
-    spans = [(0, len(points) - 1)]
-    while spans:
-        first, last = spans.pop()
-        if last - first < 2:
-            continue
-        chord = points[last] - points[first]
-        off = points[first + 1 : last] - points[first]
-        along = np.clip(off @ chord / max(float(chord @ chord), 1e-30), 0.0, 1.0)
-        far = np.linalg.norm(off - along[:, None] * chord, axis=1)
-        worst = int(far.argmax())
-        if far[worst] > _ROUNDING_M:
-            middle = first + 1 + worst
-            kept.add(middle)
-            spans += [(first, middle), (middle, last)]
-    return np.ascontiguousarray(poses[sorted(kept)])

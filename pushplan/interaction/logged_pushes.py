@@ -8,11 +8,11 @@ import numpy as np
 
 from pushplan.interaction.identification import ObservedPush
 from pushplan.world import Episode, InvalidInputError
-from pushplan.world.checks import BoolArray, FloatArray, expect
+from pushplan.world.checks import IntArray, expect
 
 _MOVING = 1e-3  # motion between two records that is no noise, in radii of the object
-_LEAST_PUSH = 0.05  # motion of the object over a push, in its radii: less says nothing
-_LONGEST_PUSH = 1.0  # way of the robot after which a push is cut, in radii of the object
+_LEAST_PUSH = 0.05  # motion of the object in a push, in its radii: less says nothing
+_LONGEST_PUSH = 1.0  # drive of the robot after which a push is cut, in radii of the object
 _PAUSE = 2  # records of an object at rest that do not end a push
 _REACH = 1.1  # distance of the robot at which it may touch, over the sum of the radii
 
@@ -31,22 +31,22 @@ def find_pushes(episode: Episode, objects: Sequence[int] | None = None) -> list[
     Raises:
         InvalidInputError: if there is no object of an id, or no push.
     """
-    world = expect("episode", episode, Episode).world
-    ids = world.movables.ids.tolist()
-    wanted = ids if objects is None else list(objects)
-    for one in wanted:
+    objects_there = expect("episode", episode, Episode).world.movables
+    ids = objects_there.ids.tolist()
+    for one in objects or ():
         if one not in ids:
             known = ", ".join(map(str, ids)) or "none"
             raise InvalidInputError(f"the log holds no object {one}, its objects: {known}")
-    found = []
-    moving = _moving(episode)
+    turns = np.diff(np.unwrap(episode.object_poses[..., 2], axis=0), axis=0)
+    moves = np.linalg.norm(np.diff(episode.object_poses[..., :2], axis=0), axis=-1)
+    moving = moves + np.abs(turns) * objects_there.radii > _MOVING * objects_there.radii
     alone = moving.sum(axis=1) == 1
-    for one in wanted:
-        k = ids.index(one)
-        if world.movables.wheeled[k]:
-            continue
-        for first, last in _intervals(moving[:, k] & alone):
-            found += _cut(episode, k, first, last)
+    found: list[ObservedPush] = []
+    for k, one in enumerate(ids):
+        if (objects is None or one in objects) and not objects_there.wheeled[k]:
+            steps = np.flatnonzero(moving[:, k] & alone)
+            for run in np.split(steps, np.flatnonzero(np.diff(steps) > _PAUSE + 1) + 1):
+                found += _cut(episode, k, run)
     if not found:
         raise InvalidInputError(
             "the log holds no push: no object without wheels was moved by the robot alone, by more "
@@ -55,47 +55,28 @@ def find_pushes(episode: Episode, objects: Sequence[int] | None = None) -> list[
     return found
 
 
-def _moving(episode: Episode) -> BoolArray:
-    """(T, K) True where an object moves from a record to the next."""
-    radii = episode.world.movables.radii
-    poses = episode.object_poses
-    turns = np.abs((np.diff(poses[..., 2], axis=0) + np.pi) % (2.0 * np.pi) - np.pi)
-    motions = np.linalg.norm(np.diff(poses[..., :2], axis=0), axis=-1) + turns * radii
-    result: BoolArray = motions > _MOVING * radii
-    return result
-
-
-def _intervals(flags: BoolArray) -> Iterator[tuple[int, int]]:
-    """First and last record of each stretch of steps (T,) that are flagged."""
-    steps = np.flatnonzero(flags)
+def _cut(episode: Episode, k: int, steps: IntArray) -> Iterator[ObservedPush]:
+    """Pushes of object k within some steps from a record to the next, each short enough."""
     if not len(steps):
         return
-    breaks = np.flatnonzero(np.diff(steps) > _PAUSE + 1)
-    starts = steps[np.append(0, breaks + 1)]
-    ends = steps[np.append(breaks, len(steps) - 1)]
-    yield from zip(starts.tolist(), (ends + 1).tolist(), strict=True)
-
-
-def _cut(episode: Episode, k: int, first: int, last: int) -> Iterator[ObservedPush]:
-    """Pushes of object k between two records, each short and long enough."""
-    radius = float(episode.world.movables.radii[k])
-    robot = episode.robot_poses
-    reach = _REACH * (radius + episode.world.robot.circumscribed_radius)
-    steps = np.linalg.norm(np.diff(robot[first : last + 1, :2], axis=0), axis=1)
-    driven = np.append(0.0, np.cumsum(steps))
+    world = episode.world
+    radius = float(world.movables.radii[k])
+    robot = episode.robot_poses[steps[0] : steps[-1] + 2]
+    objects = episode.object_poses[steps[0] : steps[-1] + 2, k]
+    driven = np.append(0.0, np.linalg.norm(np.diff(robot[:, :2], axis=0), axis=1).cumsum())
     pieces = max(1, round(float(driven[-1]) / (_LONGEST_PUSH * radius)))
-    cuts = first + np.searchsorted(driven, np.linspace(0.0, driven[-1], pieces + 1))
-    for begin, end in zip(cuts[:-1].tolist(), cuts[1:].tolist(), strict=True):
-        poses: FloatArray = episode.object_poses[begin : end + 1, k]
-        moved = float(np.linalg.norm(poses[-1, :2] - poses[0, :2]))
-        moved += radius * abs(float(poses[-1, 2] - poses[0, 2]))
-        gap = np.linalg.norm(poses[:, :2] - robot[begin : end + 1, :2], axis=1).max()
-        if len(poses) >= 2 and moved > _LEAST_PUSH * radius and gap < reach:
+    cuts = np.searchsorted(driven, np.linspace(0.0, driven[-1], pieces + 1))
+    for first, last in zip(cuts[:-1].tolist(), cuts[1:].tolist(), strict=True):
+        move = objects[last] - objects[first]
+        moved = float(np.hypot(move[0], move[1])) + radius * abs(float(move[2]))
+        gaps = np.linalg.norm((objects - robot)[first : last + 1, :2], axis=1)
+        near = gaps.max() < _REACH * (radius + world.robot.circumscribed_radius)
+        if near and moved > _LEAST_PUSH * radius:
             yield ObservedPush(
-                episode.world.robot,
-                episode.world.movables.outline(k),
-                robot[begin : end + 1],
-                poses[0],
-                poses[-1],
-                episode.world.static,
+                world.robot,
+                world.movables.outline(k),
+                robot[first : last + 1],
+                objects[first],
+                objects[last],
+                world.static,
             )

@@ -9,8 +9,7 @@ from dataclasses import fields, is_dataclass, replace
 from typing import Any, cast
 
 from pushplan.imports.on_demand import Registered, look_up
-from pushplan.interaction import InteractionModel, QuasiStatic
-from pushplan.world import InvalidInputError, Planner, Policy, UnknownNameError
+from pushplan.world import Planner, Policy, UnknownNameError
 
 _PLANNERS = {
     "straight": "pushplan.planners.shortest_path:ShortestPath",
@@ -28,9 +27,6 @@ _PLANNERS = {
 }
 PLANNERS = Registered("pushplan.planners", _PLANNERS)
 """Name -> "module:Class"; each is constructed without arguments by default."""
-
-_CONTACT_SETTINGS = ("friction", "gyration_scale", "static_friction")
-"""Of a `QuasiStatic`, which the configuration of rearrangement has as settings of its own."""
 
 OPEN_WATER = ("ship-predictive", "ship-predictive-network", "ship-predictive-published")
 """Planners that go to a goal line through water without obstacles, and nowhere else."""
@@ -90,44 +86,19 @@ def make_planner(name: str, **options: Any) -> Planner:
     return cast(Planner, _made("planner", name, PLANNERS, options))
 
 
-def make_policy(
-    name: str, *, interaction: InteractionModel | None = None, **options: Any
-) -> Policy:
+def make_policy(name: str, **options: Any) -> Policy:
     """A policy by name.
 
     Args:
         name: one of `policy_names()`.
-        interaction: model by which it predicts pushes, such as that of identified
-            `pushplan.interaction.ContactParameters`; its own if None.
         options: keyword arguments of the policy's factory, or fields of the config of the policy
-            or of its planner to change: ``make_policy("push-aware", push_weight=2.0)``.
+            or of its planner to change: ``make_policy("push-aware", push_weight=2.0)``. All that
+            predict pushes take an ``interaction``, `gtsp-mpc` a `QuasiStatic`.
 
     Raises:
         UnknownNameError: if there is no such policy, or it has no such option.
-        InvalidInputError: if the policy predicts no pushes, or by another kind of model.
     """
-    if interaction is None:
-        return cast(Policy, _made("policy", name, POLICIES, options))
-    factory = look_up("policy", POLICIES, name)
-    if "interaction" in inspect.signature(factory).parameters:
-        options["interaction"] = interaction
-        return cast(Policy, _made("policy", name, POLICIES, options))
-    made: Any = _made("policy", name, POLICIES, options)
-    planner = getattr(made, "planner", None)
-    if hasattr(planner, "interaction"):
-        made.planner = replace(cast(Any, planner), interaction=interaction)
-        made.interaction = interaction
-        return cast(Policy, made)
-    config = getattr(made, "config", None)
-    values = {key: getattr(interaction, key, None) for key in _CONTACT_SETTINGS}
-    if not all(hasattr(config, key) for key in _CONTACT_SETTINGS):
-        raise InvalidInputError(f"policy {name!r} predicts no pushes: it takes no interaction")
-    if not isinstance(interaction, QuasiStatic):
-        raise InvalidInputError(
-            f"policy {name!r} takes a QuasiStatic as its interaction, "
-            f"got {type(interaction).__name__}"
-        )
-    return cast(Policy, _made("policy", name, POLICIES, {**options, **values}))
+    return cast(Policy, _made("policy", name, POLICIES, options))
 
 
 def _made(kind: str, name: str, table: Mapping[str, str], options: dict[str, Any]) -> Any:
@@ -140,6 +111,9 @@ def _made(kind: str, name: str, table: Mapping[str, str], options: dict[str, Any
     if not changes:
         return made
     owner = getattr(made, "planner", made)
+    if "interaction" in changes and hasattr(owner, "interaction"):
+        made.interaction = changes.pop("interaction")
+        owner = made.planner = replace(cast(Any, owner), interaction=made.interaction)
     settings: Any = getattr(owner, "config", None if owner is made else owner)
     plain = is_dataclass(settings) and not isinstance(settings, type)
     names = [field.name for field in fields(settings)] if plain else []

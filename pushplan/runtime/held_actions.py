@@ -22,7 +22,7 @@ from pushplan.world import (
     WheelSpeeds,
     World,
 )
-from pushplan.world.checks import expect
+from pushplan.world.checks import expect, word
 from pushplan.world.policy_abilities import action_modes
 
 _TWISTS = ("velocity", "turn_rate")
@@ -128,14 +128,11 @@ def drivable(policy: object, hold: float, contact: ContactParameters | None = No
         InvalidInputError: if it is none of these, or does not take ``contact``.
         UnknownNameError: if there is no policy of that name.
     """
-    if contact is not None and not isinstance(policy, str):
-        raise InvalidInputError(
-            "contact goes with the name of a policy: give a policy its model when it is made, as "
-            "make_policy(name, interaction=contact.model())"
-        )
+    if contact is not None:
+        expect("contact", contact, ContactParameters)
+        policy = make_policy(word("policy with contact", policy), interaction=contact.model())
     if isinstance(policy, str):
-        model = None if contact is None else expect("contact", contact, ContactParameters).model()
-        policy = make_policy(policy, interaction=model)
+        policy = make_policy(policy)
     if isinstance(policy, Planner) and not isinstance(policy, Policy):
         policy = policy_for(policy)
     if not isinstance(policy, Policy):

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 from pushplan.files.safe_files import read_data
+from pushplan.interaction import QuasiStatic
 from pushplan.world import UnknownNameError
 from pushplan.world.checked_fields import (
     CheckedFields,
@@ -18,6 +19,7 @@ from pushplan.world.checked_fields import (
     PositiveFloat,
     PositiveInt,
 )
+from pushplan.world.checks import expect
 
 SHIFTS = (0.0, 0.4, -0.4, 0.75, -0.75)
 """Places of the robot's middle beside the object, in half widths of the bumper."""
@@ -131,8 +133,12 @@ class RearrangementConfig(CheckedFields):
     field_prefix: ClassVar[str] = "rearrangement "
 
     @classmethod
-    def of(cls, **changes: Any) -> RearrangementConfig:
+    def of(cls, *, interaction: QuasiStatic | None = None, **changes: Any) -> RearrangementConfig:
         """The default settings with some fields changed.
+
+        Args:
+            interaction: gives friction and gyration.
+            changes: other fields.
 
         Raises:
             UnknownNameError: if there is no such field.
@@ -141,4 +147,8 @@ class RearrangementConfig(CheckedFields):
         for name in changes:
             if name not in names:
                 raise UnknownNameError("setting of rearrangement", name, names)
+        if interaction is not None:
+            model = expect("interaction", interaction, QuasiStatic)
+            for name in ("friction", "static_friction", "gyration_scale"):
+                changes.setdefault(name, getattr(model, name))
         return cls(**changes)
