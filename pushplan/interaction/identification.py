@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Annotated
 
 import numpy as np
@@ -20,11 +20,14 @@ from pushplan.world.checked_fields import CheckedFields, Shape
 from pushplan.world.checks import ArrayRecord, FloatArray, expect
 from pushplan.world.outline import convex_outline, transform
 
-_ROUNDS = 4  # of draws; each but the first is centred on what the ones before have found
-_DRAWS = 64  # of parameters in a round
+_ROUNDS = 5  # of draws; each but the first is centred on what the ones before have found
+_DRAWS = 48  # of parameters in a round
+_EFFECTIVE = 12.0  # draws that count: fewer would let a round collapse onto one of them
+_FLATTER = 0.8  # factor on the logarithms of weights where too few count
 _WIDER = 1.5  # deviation of a round's draws over that of the estimate [1]
 _LEAST_DEVIATION = 0.02  # of a round's draws, of the logarithms
-_STEPS_PER_RADIUS = 400.0  # of the predictions: small beside the misses of real pushes
+_STEPS_PER_RADIUS = 200.0  # of predictions: small beside the misses of real pushes
+_FLOOR_M = 1e6  # half side of a floor without walls
 _ROUNDING_M = 2e-4  # of logged places: zigzag of that size would reverse friction at each step
 _EXACT = 1e-3  # miss of a perfect prediction, in radii of gyration
 _COORDINATES = 2.0  # that count of an end's three, which go wrong together
@@ -77,7 +80,7 @@ class ObservedPush(ArrayRecord, CheckedFields):
         static = self.static
         start = self.robot_poses[0]
         if static is None:
-            static = StaticMap.build(bounds=(*(start[:2] - 1e4), *(start[:2] + 1e4)))
+            static = _open_floor()
         objects = Movables.from_outlines([self.outline], [self.object_before])
         goal = GoalDisc(start[:2], 1.0)  # a world needs one
         return World(self.robot, start, static, objects, goal)
@@ -105,6 +108,11 @@ class ObservedPush(ArrayRecord, CheckedFields):
         """(3,) pose of the object at the end by a model."""
         end: FloatArray = model.sweep(self.world(), self.path()).object_poses[-1, 0]
         return end
+
+
+@cache
+def _open_floor() -> StaticMap:
+    return StaticMap.build(bounds=(-_FLOOR_M, -_FLOOR_M, _FLOOR_M, _FLOOR_M))
 
 
 def identify(
@@ -145,8 +153,7 @@ def identify(
         draws = np.vstack([draws, new])
         heights = np.append(heights, likely + _log_normal(new, mean, spread))
         mixture = np.logaddexp.reduce([_log_normal(draws, *one) for one in proposals])
-        weights = np.exp(heights - mixture - (heights - mixture).max())
-        weights /= weights.sum()
+        weights = _weights(heights - mixture)
         found = weights @ draws
         off = draws - found
         covariance = (weights[:, None] * off).T @ off
@@ -203,6 +210,16 @@ class _Misses:
         logs = np.log(prior.values)
         change = self.of(logs) - self.of(logs * [1.0, 1.0, 0.0])  # 0: a friction of 1
         return bool(np.abs(change).max() > self._exact)
+
+
+def _weights(logs: FloatArray) -> FloatArray:
+    """Return (N,) weights of sum 1, flattened until enough of the draws count."""
+    while True:
+        weights: FloatArray = np.exp(logs - logs.max())
+        weights /= weights.sum()
+        if weights @ weights <= 1.0 / _EFFECTIVE:
+            return weights
+        logs = _FLATTER * logs
 
 
 def _log_normal(points: FloatArray, mean: FloatArray, covariance: FloatArray) -> FloatArray:

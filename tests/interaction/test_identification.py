@@ -66,7 +66,7 @@ def pushes_by(
 
 @settings(max_examples=6)
 @given(
-    friction=st.floats(0.1, 0.55)  # beyond the steepest push none slides,
+    friction=st.floats(0.1, 0.55),  # beyond the steepest push none slides
     scale=st.floats(0.5, 1.9),
     seed=st.integers(0, 10_000),
 )
