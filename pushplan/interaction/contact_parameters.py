@@ -74,7 +74,7 @@ class ContactParameters(ArrayRecord, CheckedFields):
         outline: ArrayLike | None = None,
         support: str | ArrayLike = "evenly",
     ) -> ContactParameters:
-        """What is known before the first push.
+        """Return what is known before the first push.
 
         Args:
             materials: of robot and object, as ``"metal on wood"``; any if None.

@@ -121,7 +121,7 @@ def identify(
     """Find friction and pressure from observed pushes.
 
     Parameters are drawn from the prior, then from ever better approximations of the posterior
-    (adaptive importance sampling, Bugallo et al. 2017). The misses of the predicted ends are
+    (adaptive importance sampling). The misses of the predicted ends are
     Laplace distributed, with an unknown scale that is integrated out, so that a few pushes that
     went wrong count little. Deterministic.
 
@@ -173,7 +173,7 @@ def identify(
 
 
 class _Misses:
-    """How far predicted ends of pushes are from the observed ones, as a function of parameters."""
+    """Misses of the predicted ends of pushes, as a function of the parameters."""
 
     def __init__(self, pushes: Sequence[ObservedPush], overlap: float) -> None:
         robots: dict[int, RobotModel] = {}  # by identity: pushes that share one share its model
