@@ -11,6 +11,7 @@ from pushplan.world import Episode, InvalidInputError
 from pushplan.world.checks import IntArray, expect
 
 _MOVING = 1e-3  # motion between two records that is no noise, in radii of the object
+_NOISE = 3.0  # motion that is none, over that of the object while the robot is out of reach
 _LEAST_PUSH = 0.05  # motion of the object in a push, in its radii: less says nothing
 _LONGEST_PUSH = 1.0  # drive of the robot after which a push is cut, in radii of the object
 _PAUSE = 2  # records of an object at rest that do not end a push
@@ -37,15 +38,22 @@ def find_pushes(episode: Episode, objects: Sequence[int] | None = None) -> list[
         if one not in ids:
             known = ", ".join(map(str, ids)) or "none"
             raise InvalidInputError(f"the log holds no object {one}, its objects: {known}")
+    radii = objects_there.radii
     turns = np.diff(np.unwrap(episode.object_poses[..., 2], axis=0), axis=0)
-    moves = np.linalg.norm(np.diff(episode.object_poses[..., :2], axis=0), axis=-1)
-    moving = moves + np.abs(turns) * objects_there.radii > _MOVING * objects_there.radii
+    steps = np.linalg.norm(np.diff(episode.object_poses[..., :2], axis=0), axis=-1)
+    steps += radii * np.abs(turns)
+    gaps = np.linalg.norm((episode.object_poses - episode.robot_poses[:, None])[1:, :, :2], axis=-1)
+    far = gaps > _REACH * (radii + episode.world.robot.circumscribed_radius)
+    noise = [
+        np.quantile(steps[far[:, k], k], 0.8) if far[:, k].any() else 0.0 for k in range(len(ids))
+    ]
+    moving = ~far & (steps > np.maximum(_MOVING * radii, _NOISE * np.array(noise)))
     alone = moving.sum(axis=1) == 1
     found: list[ObservedPush] = []
     for k, one in enumerate(ids):
         if (objects is None or one in objects) and not objects_there.wheeled[k]:
-            steps = np.flatnonzero(moving[:, k] & alone)
-            for run in np.split(steps, np.flatnonzero(np.diff(steps) > _PAUSE + 1) + 1):
+            pushed = np.flatnonzero(moving[:, k] & alone)
+            for run in np.split(pushed, np.flatnonzero(np.diff(pushed) > _PAUSE + 1) + 1):
                 found += _cut(episode, k, run)
     if not found:
         raise InvalidInputError(
@@ -69,9 +77,7 @@ def _cut(episode: Episode, k: int, steps: IntArray) -> Iterator[ObservedPush]:
     for first, last in zip(cuts[:-1].tolist(), cuts[1:].tolist(), strict=True):
         move = objects[last] - objects[first]
         moved = float(np.hypot(move[0], move[1])) + radius * abs(float(move[2]))
-        gaps = np.linalg.norm((objects - robot)[first : last + 1, :2], axis=1)
-        near = gaps.max() < _REACH * (radius + world.robot.circumscribed_radius)
-        if near and moved > _LEAST_PUSH * radius:
+        if moved > _LEAST_PUSH * radius:
             yield ObservedPush(
                 world.robot,
                 world.movables.outline(k),

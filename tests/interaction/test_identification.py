@@ -246,7 +246,7 @@ def recorded(model: QuasiStatic, noise: float = 0.0) -> Episode:
     third = np.linspace([x + 0.02, y + 0.15, 0.0], [x - 0.02, y - 0.05, 0.0], 80)
     last = model.sweep(world.moved(movable_poses=first[-1]), third).object_poses
     poses = np.concatenate([first, rest, last])
-    poses[:, 0] += noise * rng.standard_normal(poses[:, 0].shape)
+    poses += noise * rng.standard_normal(poses.shape)
     return Episode(
         world=world,
         times=0.1 * np.arange(len(poses)),
@@ -266,6 +266,12 @@ def test_pushes_are_found_in_a_log_and_give_the_parameters() -> None:
     assert found.friction == pytest.approx(0.4, abs=0.1)
     assert found.gyration_scale == pytest.approx(1.5, rel=0.1)
     assert len(find_pushes(recorded(QuasiStatic(0.4, 1.5)), [4])) == len(pushes)
+
+
+def test_noise_of_objects_at_rest_is_no_push() -> None:
+    pushes = find_pushes(recorded(QuasiStatic(0.4, 1.5), noise=2e-4))
+    assert 3 <= len(pushes) <= 10
+    assert identify(pushes).gyration_scale == pytest.approx(1.5, rel=0.25)
 
 
 def test_a_log_without_what_is_asked_for_says_so() -> None:
