@@ -44,10 +44,10 @@ def find_pushes(episode: Episode, objects: Sequence[int] | None = None) -> list[
     steps += radii * np.abs(turns)
     gaps = np.linalg.norm((episode.object_poses - episode.robot_poses[:, None])[1:, :, :2], axis=-1)
     far = gaps > _REACH * (radii + episode.world.robot.circumscribed_radius)
-    noise = [
-        np.quantile(steps[far[:, k], k], 0.8) if far[:, k].any() else 0.0 for k in range(len(ids))
-    ]
-    moving = ~far & (steps > np.maximum(_MOVING * radii, _NOISE * np.array(noise)))
+    noise = np.zeros(len(ids))
+    for k in np.flatnonzero(far.any(axis=0)):
+        noise[k] = np.quantile(steps[far[:, k], k], 0.8)
+    moving = ~far & (steps > np.maximum(_MOVING * radii, _NOISE * noise))
     alone = moving.sum(axis=1) == 1
     found: list[ObservedPush] = []
     for k, one in enumerate(ids):
