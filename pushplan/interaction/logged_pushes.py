@@ -45,7 +45,7 @@ def find_pushes(episode: Episode, objects: Sequence[int] | None = None) -> list[
     gaps = np.linalg.norm((episode.object_poses - episode.robot_poses[:, None])[1:, :, :2], axis=-1)
     far = gaps > _REACH * (radii + episode.world.robot.circumscribed_radius)
     noise = np.zeros(len(ids))
-    for k in np.flatnonzero(far.any(axis=0)):
+    for k in np.flatnonzero(far.any(axis=0)).tolist():
         noise[k] = np.quantile(steps[far[:, k], k], 0.8)
     moving = ~far & (steps > np.maximum(_MOVING * radii, _NOISE * noise))
     alone = moving.sum(axis=1) == 1
