@@ -7,9 +7,10 @@ import runpy
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from pushplan.interaction import QuasiStatic
+from pushplan.interaction import ObservedPush, QuasiStatic
 from pushplan.planners.arguments import check_pusher
 from pushplan.world import Movables, Receptacle, StaticMap, World, area_clearing_robot
 
@@ -76,3 +77,37 @@ def test_a_call_path_stays_in_the_files_whose_functions_get_the_world() -> None:
         "planners/arguments.py",
         "interaction/quasi_static.py",
     ]
+
+
+def test_real_pushes_reads_files_of_any_number_and_length(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from benchmarks.accuracy import real_pushes
+
+    lengths = (40, 900, 300, 5)
+    rng = np.random.default_rng(0)
+    befores = []
+    afters = []
+    robots = []
+    for rows in lengths:
+        x = np.linspace(-0.052, -0.052 + 1e-4 * rows, rows)
+        y = np.linspace(0.03, 0.03 + 2e-5 * rows, rows)
+        path = np.column_stack([x, y, np.zeros(rows)])
+        before = np.zeros(3)
+        push = ObservedPush(real_pushes.finger(), real_pushes.BLOCK, path, before, before)
+        befores.append(before)
+        afters.append(push.predicted(QuasiStatic(0.4, 1.2)) + 1e-4 * rng.standard_normal(3))
+        robots.append(np.column_stack([np.arange(rows), np.round(path, 4)]))
+    np.savez(
+        tmp_path / "flat.npz",
+        object_before=befores,
+        object_after=afters,
+        robot=np.concatenate(robots),
+        robot_offsets=np.append(0, np.cumsum(lengths)),
+        support_points_body=np.zeros((0, 2)),
+    )
+    monkeypatch.setattr(sys, "argv", ["real_pushes", str(tmp_path), "--seeds", "1"])
+    real_pushes.main()
+    rows_of = dict(re.findall(r"^\| ([^|]+) \| ([\d.]+) \|", capsys.readouterr().out, re.MULTILINE))
+    assert float(rows_of["identified from all and tested on them"]) < float(rows_of["no motion"])
+    assert float(rows_of["gyration of the support"]) == pytest.approx(0.90, abs=0.01)

@@ -92,7 +92,8 @@ def make_policy(name: str, **options: Any) -> Policy:
     Args:
         name: one of `policy_names()`.
         options: keyword arguments of the policy's factory, or fields of the config of the policy
-            or of its planner to change: ``make_policy("push-aware", push_weight=2.0)``.
+            or of its planner to change: ``make_policy("push-aware", push_weight=2.0)``. All that
+            predict pushes take an ``interaction``, `gtsp-mpc` a `QuasiStatic`.
 
     Raises:
         UnknownNameError: if there is no such policy, or it has no such option.
@@ -110,6 +111,9 @@ def _made(kind: str, name: str, table: Mapping[str, str], options: dict[str, Any
     if not changes:
         return made
     owner = getattr(made, "planner", made)
+    if "interaction" in changes and hasattr(owner, "interaction"):
+        made.interaction = changes.pop("interaction")
+        owner = made.planner = replace(cast(Any, owner), interaction=made.interaction)
     settings: Any = getattr(owner, "config", None if owner is made else owner)
     plain = is_dataclass(settings) and not isinstance(settings, type)
     names = [field.name for field in fields(settings)] if plain else []

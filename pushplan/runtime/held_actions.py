@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from pushplan.control import ImmediateExecutor
+from pushplan.interaction import ContactParameters
 from pushplan.planners import make_policy, policy_for
 from pushplan.world import (
     ChoosesActions,
@@ -21,6 +22,7 @@ from pushplan.world import (
     WheelSpeeds,
     World,
 )
+from pushplan.world.checks import expect, word
 from pushplan.world.policy_abilities import action_modes
 
 _TWISTS = ("velocity", "turn_rate")
@@ -114,17 +116,21 @@ def twist_of(world: World, action: object) -> Twist:
     )
 
 
-def drivable(policy: object, hold: float) -> Any:
+def drivable(policy: object, hold: float, contact: ContactParameters | None = None) -> Any:
     """Return the policy that a runner drives: one that plans beside driving.
 
     Args:
         policy: a policy, a planner, or the name of one.
         hold: for how long an action of a policy that plans in one go is held [s].
+        contact: friction and pressure by which a policy of a name predicts pushes.
 
     Raises:
-        InvalidInputError: if it is none of these.
+        InvalidInputError: if it is none of these, or does not take ``contact``.
         UnknownNameError: if there is no policy of that name.
     """
+    if contact is not None:
+        expect("contact", contact, ContactParameters)
+        policy = make_policy(word("policy with contact", policy), interaction=contact.model())
     if isinstance(policy, str):
         policy = make_policy(policy)
     if isinstance(policy, Planner) and not isinstance(policy, Policy):

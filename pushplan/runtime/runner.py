@@ -16,6 +16,7 @@ import numpy as np
 from pushplan.control import waiting_twist
 from pushplan.control.limits import driven_twist
 from pushplan.errors import describe
+from pushplan.interaction import ContactParameters
 from pushplan.runtime.command import Command, CommandStatus, RunLog
 from pushplan.runtime.held_actions import drivable
 from pushplan.runtime.interpreter_turns import take_short_turns, take_usual_turns
@@ -79,6 +80,8 @@ class Runner:
         margin: distance that plans keep from what is static [m]; if None that of the worlds, and
             twice what noise leaves at the robot's farthest point, whichever is more.
         keep_unseen: for how long an object is taken to be there that is missing in the worlds [s].
+        contact: friction and pressure, as `pushplan.interaction.identify` finds them, by which the
+            policy predicts pushes; for a policy that is given by its name.
         log: keeps worlds, plans and commands.
         executor: runs planning calls; a thread by default, another one for simulation.
         clock: returns seconds, by which planning calls are timed.
@@ -117,6 +120,7 @@ class Runner:
         observer_gain: float | None = None,
         margin: float | None = None,
         keep_unseen: float = 0.0,
+        contact: ContactParameters | None = None,
         log: RunLog | None = None,
         executor: PlanningExecutor | None = None,
         clock: Callable[[], float] = time.perf_counter,
@@ -137,7 +141,7 @@ class Runner:
         if observer_gain is None:
             observer_gain = _SMOOTHING if any(noise) else 1.0
         gain = number("observer_gain", observer_gain, low=0.0, high=1.0, open_low=True)
-        self.policy = drivable(policy, self.max_age)
+        self.policy = drivable(policy, self.max_age, contact)
         left = math.sqrt(gain / (2.0 - gain))  # of white noise, after a filter of that gain
         self._allowance = NoiseAllowance(left * noise[0], left * noise[1], self.period, self.margin)
         self._guard = ObstacleGuard(self._allowance, self.period)

@@ -20,6 +20,7 @@ COMMANDS = (
     "bench",
     "list",
     "score",
+    "identify",
     "report",
     "ice",
     "teleop",

@@ -44,6 +44,7 @@ USERS_MISTAKES = {
     "serve": [["nobody", "--socket", "unix:never-made"]],
     "list": [["things"]],
     "score": [["none.npz"], [ROOM], ["FOLDER"]],
+    "identify": [["none.npz"], ["none.mcap"], ["FILE"], ["FOLDER"]],
     "report": [["FOLDER"]],
     "runs compare": [["FOLDER", "FOLDER"]],
     "runs status": [["FOLDER"]],

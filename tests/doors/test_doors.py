@@ -40,8 +40,8 @@ def test_mutations_give_a_value_or_one_line(name: str, tmp_path: Path) -> None:
 STRUCTURED = ("world-json", "scenarios", "ice-json", "map-yaml", "training", "specification")
 
 
-@pytest.mark.filterwarnings("error")  # nothing is said beside the one line
 @pytest.mark.filterwarnings("ignore::pushplan.world.outline_repair.OutlineWarning")
+@pytest.mark.filterwarnings("error")  # nothing is said beside the one line
 @pytest.mark.parametrize("name", STRUCTURED)
 def test_any_value_of_any_key_may_be_wrong(name: str, tmp_path: Path) -> None:
     path, good = DOORS[name].make(tmp_path)

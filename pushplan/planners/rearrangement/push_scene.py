@@ -155,6 +155,7 @@ class PushScene:
         config = self.config
         model = QuasiStatic(
             config.friction,
+            config.gyration_scale,
             step=_CONTACT_STEP,
             iterations=_CONTACT_ROUNDS,
             static_friction=config.static_friction,

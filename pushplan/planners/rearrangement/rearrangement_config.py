@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 from pushplan.files.safe_files import read_data
+from pushplan.interaction import QuasiStatic
 from pushplan.world import UnknownNameError
 from pushplan.world.checked_fields import (
     CheckedFields,
@@ -15,8 +16,10 @@ from pushplan.world.checked_fields import (
     NonNegativeFloat,
     NonNegativeInt,
     OneOf,
+    PositiveFloat,
     PositiveInt,
 )
+from pushplan.world.checks import expect
 
 SHIFTS = (0.0, 0.4, -0.4, 0.75, -0.75)
 """Places of the robot's middle beside the object, in half widths of the bumper."""
@@ -78,6 +81,8 @@ class RearrangementConfig(CheckedFields):
             an object as heavy as the robot: the w of J = l_0 + w sum(m_i l_i) / m_0.
         friction: Coulomb coefficient between robot and objects, for the prediction.
         static_friction: the same between objects and walls.
+        gyration_scale: factor on the radius of the objects' limit surface; see
+            `pushplan.interaction.QuasiStatic`.
         later_fraction: of the cost of contacts in those, as objects will have gone by then.
         contact_cost: least cost of carrying an object along on an approach, however light it is.
         target_cost: what is added to it for the object that is to be pushed.
@@ -106,6 +111,7 @@ class RearrangementConfig(CheckedFields):
     work_weight: Annotated[float, Limits(0.0, 1e6)] = 12.0
     friction: Annotated[float, Limits(0.0, 1e6)] = 0.2
     static_friction: Annotated[float, Limits(0.0, 1e6)] = 0.0
+    gyration_scale: PositiveFloat = 1.0
     later_fraction: Fraction = 0.5
     contact_cost: Annotated[float, Limits(0.0, 1e6)] = 1.0
     target_cost: NonNegativeFloat = 5.0
@@ -127,8 +133,12 @@ class RearrangementConfig(CheckedFields):
     field_prefix: ClassVar[str] = "rearrangement "
 
     @classmethod
-    def of(cls, **changes: Any) -> RearrangementConfig:
+    def of(cls, *, interaction: QuasiStatic | None = None, **changes: Any) -> RearrangementConfig:
         """The default settings with some fields changed.
+
+        Args:
+            interaction: gives friction and gyration.
+            changes: other fields.
 
         Raises:
             UnknownNameError: if there is no such field.
@@ -137,4 +147,8 @@ class RearrangementConfig(CheckedFields):
         for name in changes:
             if name not in names:
                 raise UnknownNameError("setting of rearrangement", name, names)
+        if interaction is not None:
+            model = expect("interaction", interaction, QuasiStatic)
+            for name in ("friction", "static_friction", "gyration_scale"):
+                changes.setdefault(name, getattr(model, name))
         return cls(**changes)
