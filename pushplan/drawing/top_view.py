@@ -99,9 +99,12 @@ def draw_moving(
         if len(parts) == 1:
             canvas.polygon(transform(pose, parts[0]), fill, edge, palette.box_edge_px)
             continue
+        rings = objects.rings(k)
+        if len(rings) > 1:  # shows which legs are of one table
+            canvas.polygon(transform(pose, objects.outline(k)), None, palette.ghost, 1.0)
         for part in parts:
             canvas.polygon(transform(pose, part), fill, fill)
-        for ring in objects.rings(k):
+        for ring in rings:
             canvas.polygon(transform(pose, ring), None, edge, palette.box_edge_px)
     for poses, rings in pushed(world, plan):  # and where the plan expects them at its end
         canvas.line(poses[:, :2], palette.prediction, 1.5)

@@ -254,8 +254,8 @@ def _apart(field: IceField, is_bounded: bool) -> IceField:
         stacklevel=3,
     )
     floes = [
-        tuple(part + shift for part in parts) if moved[k] else parts
-        for k, (parts, shift) in enumerate(zip(field.floes, shifts, strict=True))
+        tuple(part + shift for part in parts)
+        for parts, shift in zip(field.floes, shifts, strict=True)
     ]
     return IceField(tuple(floes), _bounds(floes, field.bounds if is_bounded else None))
 
