@@ -100,6 +100,11 @@ void bind_envs(nb::module_& module) {
             ChipmunkHandles handles{std::bit_cast<cpSpace*>(space), pointers<cpBody>(bodies), {}};
             for (const auto& own : shapes) handles.shapes.push_back(pointers<cpShape>(own));
             require_count("shapes", shapes.size(), bodies.size());
+            require_count("bodies", bodies.size(), reach.count() + 1);
+            for (const std::size_t rows :
+                 {keeps.shape(0), inertia.shape(0), drag.shape(0), states.shape(0)}) {
+              require_count("rows of bodies", rows, bodies.size());
+            }
             const Momentum momentum{view(keeps), rows_as<const Inertia>(inertia),
                                     rows_as<const BodyDrag>(drag)};
             new (self) PlanarSimulator(

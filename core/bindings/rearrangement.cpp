@@ -100,7 +100,7 @@ void bind_goal(nb::module_& module) {
         require_objects(objects, bodies);
         NewArray<bool, 1> done({extent(objects, 0)});
         without_gil(
-            [&] { GoalTest(bodies.objects, goal).all_done(poses(objects), done.numbers()); });
+            [&] { GoalTest(bodies.shapes, goal).all_done(poses(objects), done.numbers()); });
         return done.give();
       },
       "poses"_a.noconvert(), "bodies"_a, "goal"_a, kOwned,

@@ -166,8 +166,9 @@ Plan PlanningCall::run() {
     const Index begun = iterations_;
     if (push_aware && maker.useful() && maker.done()) search_table(table);
     const auto searched = static_cast<double>(iterations_ - begun);
-    grow_trees(solved() && push_aware ? static_cast<Index>(kRandomFraction * searched)
-                                      : kTreeNodes);
+    const bool shared = solved() && push_aware && searched > 0.0;  // with searches of the table
+    grow_trees(shared ? std::max<Index>(1, static_cast<Index>(kRandomFraction * searched))
+                      : kTreeNodes);
     if (solved() || round < 1) continue;
     detour_ *= 1.5;  // the way may be longer, or begin with a tight turn
     set_radius(robot_.drive == Drive::kDifferential ? 0.5 * problem_.turning_radius

@@ -43,7 +43,7 @@ def gyration_squares(movables: Movables) -> FloatArray:
     The square of the radius of its limit surface: as given, or that of its area as drawn.
     """
     squares = movables.gyration_radii**2
-    for k in np.flatnonzero(squares == 0.0).tolist():
+    for k in np.flatnonzero(movables.gyration_radii == 0.0).tolist():
         squares[k] = _second_moment(movables.pieces(k))
     return squares
 

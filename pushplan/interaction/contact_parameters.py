@@ -28,6 +28,7 @@ SPREADS = (0.4, 0.5, 0.4)
 """Deviations of the logarithms of friction, gyration and friction at walls before a push."""
 _LEAST_SPREAD = 0.2  # of a friction from the table: surfaces of a material differ
 _SUPPORT_SPREAD = 0.15  # of a gyration from a known support
+_MOST = 100.0  # variance of a logarithm
 _LEFT_OVER = 0.1  # of the inscribed radius of a part that is shrunk
 _LINES = 64  # from the origin to each edge, for the mean distance of an even pressure
 
@@ -66,6 +67,16 @@ class ContactParameters(ArrayRecord, CheckedFields):
     miss: NonNegativeFloat = 0.0
     pushes: NonNegativeInt = 0
     saw_walls: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        covariance = self.log_covariance
+        least = float(np.linalg.eigvalsh(covariance).min())
+        if not np.allclose(covariance, covariance.T) or least < -1e-9 or covariance.max() > _MOST:
+            raise InvalidInputError(
+                "log_covariance must be symmetric, positive semidefinite and at most "
+                f"{_MOST:g}, got {covariance.tolist()}"
+            )
 
     @classmethod
     def prior(
@@ -140,7 +151,8 @@ class ContactParameters(ArrayRecord, CheckedFields):
 
     def to_dict(self) -> dict[str, Any]:
         """All fields, as JSON has them."""
-        return {**vars(self), "log_covariance": self.log_covariance.tolist()}
+        values = {one.name: getattr(self, one.name) for one in fields(self)}
+        return {**values, "log_covariance": self.log_covariance.tolist()}
 
     @classmethod
     def load(cls, path: str | Path) -> ContactParameters:

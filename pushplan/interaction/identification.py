@@ -10,9 +10,8 @@ from typing import Annotated
 
 import numpy as np
 
-from pushplan.core import geometry as core_geometry
 from pushplan.core import interaction as core
-from pushplan.geometry import convex_penetration
+from pushplan.geometry import convex_penetration, gyration_squares
 from pushplan.interaction.contact_parameters import ContactParameters
 from pushplan.interaction.quasi_static import QuasiStatic
 from pushplan.world import GoalDisc, InvalidInputError, Movables, RobotModel, StaticMap, World
@@ -25,6 +24,7 @@ _DRAWS = 48  # of parameters in a round
 _EFFECTIVE = 12.0  # draws that count: fewer would let a round collapse onto one of them
 _FLATTER = 0.8  # factor on the logarithms of weights where too few count
 _WIDER = 1.5  # deviation of a round's draws over that of the estimate [1]
+_CERTAIN = 1e-6  # deviation of a logarithm that a prior gives as 0
 _LEAST_DEVIATION = 0.02  # of a round's draws, of the logarithms
 _STEPS_PER_RADIUS = 200.0  # of predictions: small beside the misses of real pushes
 _FLOOR_M = 1e6  # half side of a floor without walls
@@ -41,12 +41,14 @@ class ObservedPush(ArrayRecord, CheckedFields):
 
     Args:
         robot: what pushed; its footprint counts.
-        outline: (V, 2) convex outline of the object, its centroid at the origin [m].
+        outline: (V, 2) convex outline of the object, or its hull, in its body frame [m].
         robot_poses: (N, 3) x, y [m], theta [rad] of the robot from before or at the first contact
             to the end.
         object_before: (3,) pose of the object at the first of them.
         object_after: (3,) the same at the last of them.
         static: walls that the object may have touched; none if None.
+        movable: the one object itself, where it is more than its outline, which then has its
+            centroid at the origin; wherever it is.
 
     Raises:
         InvalidInputError: if a value has the wrong shape or is not finite, or there are fewer than
@@ -61,10 +63,16 @@ class ObservedPush(ArrayRecord, CheckedFields):
     object_before: Annotated[FloatArray, Shape(3)]
     object_after: Annotated[FloatArray, Shape(3)]
     static: StaticMap | None = None
+    movable: Movables | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "outline", convex_outline("push.outline", self.outline))
+        if self.movable is None:
+            made = Movables.from_outlines([self.outline], np.zeros((1, 3)))
+            object.__setattr__(self, "movable", made)
+        elif len(self.movable) != 1:
+            raise InvalidInputError(f"push.movable must be one object, got {len(self.movable)}")
         if len(self.robot_poses) < 2:
             raise InvalidInputError(
                 f"push.robot_poses must hold at least two poses, got {len(self.robot_poses)}"
@@ -72,8 +80,9 @@ class ObservedPush(ArrayRecord, CheckedFields):
 
     @cached_property
     def gyration(self) -> float:
-        """Radius of gyration of the outline [m]."""
-        return math.sqrt(core_geometry.polygon_inertia(self.outline))
+        """Radius of gyration of the object [m]."""
+        assert self.movable is not None
+        return math.sqrt(gyration_squares(self.movable)[0])
 
     def world(self) -> World:
         """The scene before the push."""
@@ -81,7 +90,8 @@ class ObservedPush(ArrayRecord, CheckedFields):
         start = self.robot_poses[0]
         if static is None:
             static = _open_floor()
-        objects = Movables.from_outlines([self.outline], [self.object_before])
+        assert self.movable is not None
+        objects = self.movable.moved_to([self.object_before])
         goal = GoalDisc(start[:2], 1.0)  # a world needs one
         return World(self.robot, start, static, objects, goal)
 
@@ -142,7 +152,7 @@ def identify(
     rng = np.random.default_rng(0)
     start = np.log(prior.values)
     mean = start[:free]
-    spread = prior.log_covariance[:free, :free]
+    spread = prior.log_covariance[:free, :free] + _CERTAIN**2 * np.eye(free)
     proposals = [(mean, spread)]
     draws = np.zeros((0, free))
     heights = np.zeros(0)
@@ -217,7 +227,7 @@ def _weights(logs: FloatArray) -> FloatArray:
     while True:
         weights: FloatArray = np.exp(logs - logs.max())
         weights /= weights.sum()
-        if weights @ weights <= 1.0 / _EFFECTIVE:
+        if not weights @ weights > 1.0 / _EFFECTIVE:
             return weights
         logs = _FLATTER * logs
 

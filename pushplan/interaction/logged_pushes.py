@@ -85,4 +85,5 @@ def _cut(episode: Episode, k: int, steps: IntArray) -> Iterator[ObservedPush]:
                 objects[first],
                 objects[last],
                 world.static,
+                world.movables.select([k]),
             )

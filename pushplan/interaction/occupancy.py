@@ -126,8 +126,10 @@ def ice_density(world: World) -> float:
     movables = world.movables
     if len(movables) == 0:
         return 1.0
-    (x, y) = movables.part_vertices.T
-    following = next_corner(movables.part_offsets)
+    if movables.is_compound:
+        return float(movables.masses.sum() / movables.contact_areas.sum())
+    (x, y) = movables.vertices.T
+    following = next_corner(movables.offsets)
     area = 0.5 * float((x * y[following] - x[following] * y).sum())
     return float(movables.masses.sum()) / area
 

@@ -34,7 +34,9 @@ def transport_bound(world: World) -> float:
     for i, k in enumerate(left):
         way = distances.path_from(movables.poses[k, :2]).length / (1.0 + TOO_LONG)
         if 0.0 < way < np.inf:
-            lengths[i] = way + max(map(inscribed_radius, movables.drawn_parts(int(k))))
+            # an origin outside of its object may get past walls, and need not get anywhere
+            inner = max(map(inscribed_radius, movables.drawn_parts(int(k))))
+            lengths[i] = way + inner if inner > 0.0 else 0.0
     away = np.hypot(*(movables.poses[:, :2] - world.robot_pose[:2]).T)
     approach = max(0.0, float((away - movables.radii).min()) - robot.circumscribed_radius)
     return robot.mass * approach + float(movables.masses[left] @ lengths)

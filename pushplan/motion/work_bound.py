@@ -115,6 +115,8 @@ class _Relaxation:
         count = len(world.movables)
         inner = [max(map(inscribed_radius, world.movables.parts(k))) for k in range(count)]
         self.inner = (1.0 - SLIM) * np.array(inner, dtype=np.float64).reshape(count)
+        # a path may pass the origin of an object that is not in it, such as a table: left out
+        self.inner[self.inner == 0.0] = -self.clearance
 
     def root(self) -> _Node | None:
         """All depths are possible; None where there is no path at all, or it begins in a wall."""

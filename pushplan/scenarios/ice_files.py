@@ -6,19 +6,20 @@ import json
 import warnings
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from operator import itemgetter
+from operator import attrgetter
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
+from numpy.typing import ArrayLike
 
 from pushplan.errors import short
 from pushplan.files.safe_files import known_keys, read_data, read_npy, read_npz
 from pushplan.geometry import convex_penetration
 from pushplan.scenarios.ice_field import IceField
 from pushplan.world import InvalidInputError, SchemaError
-from pushplan.world.checks import BoolArray, FloatArray, IntArray, array, checked_bounds, expect
+from pushplan.world.checks import FloatArray, IntArray, array, checked_bounds, expect
 from pushplan.world.convex_shapes import hull_of, listed_corners, shapes_of
 from pushplan.world.outline import ConvexParts, flatten, outline_boxes
 from pushplan.world.outline_repair import OutlineWarning
@@ -27,13 +28,20 @@ SCHEMA = "pushplan-ice/1"
 """Name and version of the JSON form; files of another version are refused."""
 _MAX_BYTES = 10**8
 ENDINGS = (".json", ".npz", ".npy")
-_OVERLAP = 1e-6
-"""Depth [radii of the smaller floe] to which floes may overlap: rounding, where they touch."""
-_ROUNDS = 500  # in which floes that overlap are moved apart, at most
-_GAP = 1e-3  # that is left between them [radii of the smaller floe]
+_TOUCH_RADII = 1e-6  # depth to which floes may overlap: rounding, where they touch
+_GAP_RADII = 1e-3  # that is left between floes that were moved apart; of the smaller one both
+_MOST_TESTS = 300_000  # of pairs of parts, when floes are moved apart
+_PATIENCE = 40  # rounds in which the deepest overlap has to become less
+_WAY_ON = "overlaps=True (--overlaps, the variation ice_overlaps) leaves them as they are"
 
 
-def load_ice(path: str | Path, *, hull: bool = False, overlaps: bool = False) -> IceField:
+def load_ice(
+    path: str | Path,
+    *,
+    hull: bool = False,
+    overlaps: bool = False,
+    within: ArrayLike | None = None,
+) -> IceField:
     """Read an ice field.
 
     - ``.json``: a list of polygons, each a list of [x, y] corners [m]; or a mapping with
@@ -47,18 +55,20 @@ def load_ice(path: str | Path, *, hull: bool = False, overlaps: bool = False) ->
     Floes need not be convex; a list of outlines in place of one is a floe of several parts. They
     are repaired and cut into convex parts as `pushplan.world.outline_repair.outline_parts` says.
     Those that overlap are moved apart: again and again each pair by the least translation that
-    separates it, the lighter floe more, and back into stated bounds. An `OutlineWarning` says how
-    far. Without bounds, the rectangle around all floes counts.
+    separates its deepest parts, the smaller floe more. An `OutlineWarning` says how far. Without
+    bounds, the rectangle around all floes counts.
 
     Args:
         path: the file.
         hull: take the convex hull of a floe that is not convex.
         overlaps: leave floes that overlap where they are, as those of the 2D benchmark are.
+        within: (4,) x_min, y_min, x_max, y_max to which floes may be moved [m]; the bounds that the
+            file states if None, or else anywhere.
 
     Raises:
         SchemaError: if the file cannot be read or has another form.
-        InvalidInputError: if a floe crosses itself, has no area or leaves the bounds, or if there
-            is no room to move floes apart. Messages name the file, the polygon, counted from 0,
+        InvalidInputError: if a floe crosses itself, has no area or leaves the bounds, or if floes
+            cannot be moved apart. Messages name the file, the polygon, counted from 0,
             and the rule.
     """
     path = _path(path)
@@ -78,7 +88,8 @@ def load_ice(path: str | Path, *, hull: bool = False, overlaps: bool = False) ->
         field = IceField(tuple(floes), _bounds(floes, bounds))
         _check_inside(field)
         if not overlaps:
-            field = _apart(field, is_bounded=bounds is not None)
+            room = bounds if within is None else within
+            field = _apart(field, None if room is None else checked_bounds("within", room))
         return field
     except InvalidInputError as error:
         raise InvalidInputError(f"{path}: {error}") from error
@@ -218,38 +229,42 @@ def _check_inside(field: IceField) -> None:
         )
 
 
-def _apart(field: IceField, is_bounded: bool) -> IceField:
-    """The field with floes that overlap moved apart, if need be beyond bounds that nobody gave."""
+def _apart(field: IceField, room: FloatArray | None) -> IceField:
+    """The field with overlapping floes moved apart, within a rectangle (4,) [m] if there is one."""
     boxes = _boxes(field.floes)
     shifts = np.zeros((len(field), 2))
-    pairs = _overlaps(field, boxes, shifts)
+    tests, pairs = _overlaps(field, boxes, shifts)
+    if not pairs:
+        return field
+    if room is not None and field.areas.sum() > np.prod(room[2:] - room[:2]):
+        raise InvalidInputError(
+            f"floes must not overlap: they have {field.areas.sum():.3g} m² in all, in "
+            f"{np.prod(room[2:] - room[:2]):.3g} m² of water; {_WAY_ON}"
+        )
     first_count = len(pairs)
-    for _ in range(_ROUNDS):
-        if not pairs:
-            break
+    depths = [max(pair.depth for pair in pairs)]
+    while pairs and tests < _MOST_TESTS and min(depths[-_PATIENCE:]) <= min(depths):
         for a, b, depth, normal in pairs:
             share = field.areas[b] / (field.areas[a] + field.areas[b])
-            way = (depth + _GAP * min(field.radii[a], field.radii[b])) * normal
+            way = (depth + _GAP_RADII * min(field.radii[a], field.radii[b])) * normal
             shifts[a] -= share * way
             shifts[b] += (1.0 - share) * way
-        if is_bounded:
-            room = (field.bounds[:2] - boxes[:, :2], field.bounds[2:] - boxes[:, 2:])
-            shifts = np.clip(shifts, *room)
-        pairs = _overlaps(field, boxes, shifts)
+        if room is not None:
+            shifts = np.clip(shifts, room[:2] - boxes[:, :2], room[2:] - boxes[:, 2:])
+        count, pairs = _overlaps(field, boxes, shifts)
+        tests += count
+        depths.append(max((pair.depth for pair in pairs), default=0.0))
     if pairs:
-        a, b, depth, _ = max(pairs, key=itemgetter(2))
+        worst = max(pairs, key=attrgetter("depth"))
         raise InvalidInputError(
-            f"floes must not overlap, and there is no room to move them apart: of {len(pairs)} "
-            f"pairs, polygons {a} and {b} still overlap by {depth:.3g} m; overlaps=True "
-            "(--overlaps, the variation ice_overlaps) leaves them as they are"
+            f"floes must not overlap, and could not be moved apart: of {len(pairs)} pairs, "
+            f"polygons {worst.first} and {worst.second} still overlap by {worst.depth:.3g} m; "
+            f"{_WAY_ON}"
         )
-    moved: BoolArray = (shifts != 0.0).any(axis=1)
-    if not moved.any():
-        return field
-    ways = np.hypot(*shifts.T)
+    moved = (shifts != 0.0).any(axis=1)
     warnings.warn(
-        f"{first_count} pairs of floes overlapped: {int(moved.sum())} of {len(field)} floes were "
-        f"moved apart by at most {ways.max():.3g} m",
+        f"floes overlapped in {first_count} places: {int(moved.sum())} of {len(field)} floes were "
+        f"moved apart by at most {np.hypot(*shifts.T).max():.3g} m",
         OutlineWarning,
         stacklevel=3,
     )
@@ -257,24 +272,30 @@ def _apart(field: IceField, is_bounded: bool) -> IceField:
         tuple(part + shift for part in parts)
         for parts, shift in zip(field.floes, shifts, strict=True)
     ]
-    return IceField(tuple(floes), _bounds(floes, field.bounds if is_bounded else None))
+    return IceField(tuple(floes), _bounds(floes, None if room is None else field.bounds))
 
 
-def _overlaps(
-    field: IceField, boxes: FloatArray, shifts: FloatArray
-) -> list[tuple[int, int, float, FloatArray]]:
-    """Pairs of shifted floes that overlap: both, how deep [m], and the way out for the second."""
-    low, high = boxes[:, :2] + shifts, boxes[:, 2:] + shifts
-    tree = shapely.STRtree(shapely.box(*low.T, *high.T))
-    pairs = tree.query(tree.geometries, predicate="intersects").T
-    found = []
-    for a, b in pairs[pairs[:, 0] < pairs[:, 1]].tolist():
-        shift = shifts[b] - shifts[a]
-        depth, *normal = max(
-            convex_penetration(one, other + shift)
-            for one in field.floes[a]
-            for other in field.floes[b]
-        )
-        if depth > _OVERLAP * min(field.radii[a], field.radii[b]):
-            found.append((a, b, depth, np.array(normal)))
-    return found
+class _Overlap(NamedTuple):
+    first: int
+    second: int
+    depth: float  # [m]
+    normal: FloatArray  # (2,) unit, the way out for the second
+
+
+def _overlaps(field: IceField, boxes: FloatArray, shifts: FloatArray) -> tuple[int, list[_Overlap]]:
+    """Count tests of parts, and find the deepest overlap of each pair of shifted floes."""
+    parts = [part + shifts[k] for k, floe in enumerate(field.floes) for part in floe]
+    owners = np.repeat(np.arange(len(field)), [len(floe) for floe in field.floes])
+    low_x, low_y, high_x, high_y = outline_boxes(*flatten(parts)).T
+    tree = shapely.STRtree(shapely.box(low_x, low_y, high_x, high_y))
+    first, second = tree.query(tree.geometries, predicate="intersects")
+    near = owners[first] < owners[second]
+    found: dict[tuple[int, int], _Overlap] = {}
+    for i, j in zip(first[near].tolist(), second[near].tolist(), strict=True):
+        a, b = int(owners[i]), int(owners[j])
+        depth, *normal = convex_penetration(parts[i], parts[j])
+        if depth > _TOUCH_RADII * min(field.radii[a], field.radii[b]):
+            deepest = found.get((a, b))
+            if deepest is None or depth > deepest.depth:
+                found[a, b] = _Overlap(a, b, depth, np.array(normal))
+    return int(near.sum()), list(found.values())

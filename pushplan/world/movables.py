@@ -36,6 +36,8 @@ from pushplan.world.outline import (
     well_formed,
 )
 
+_OF_SHAPES = ("_contact_parts", "_contact_hulls", "_areas_and_centres")
+"""Caches that do not depend on poses."""
 _ONE_EACH = ("poses", "twists", "masses", "wheeled", "contact_radii", "fixed", "gyration_radii")
 
 
@@ -118,9 +120,12 @@ class Movables(ArrayRecord, CheckedFields):
             raise InvalidInputError(
                 f"movables.contact_radii must be at most {LARGEST_M:g} m, got {most:g}"
             )
-        if (self.gyration_radii < 0.0).any():
-            least = self.gyration_radii.min()
-            raise InvalidInputError(f"movables.gyration_radii must not be negative, got {least}")
+        given = self.gyration_radii[self.gyration_radii != 0.0]
+        if not ((given > 1.0 / LARGEST_M) & (given <= LARGEST_M)).all():
+            raise InvalidInputError(
+                f"movables.gyration_radii must be 0, or more and at most {LARGEST_M:g} m, "
+                f"got {self.gyration_radii.tolist()!s:.80}"
+            )
         if self.drawn_offsets[-1] != len(self.drawn_vertices):
             raise InvalidInputError(
                 "movables.drawn_offsets must rise from 0 to len(drawn_vertices)"
@@ -359,12 +364,10 @@ class Movables(ArrayRecord, CheckedFields):
 
     @property
     def contact_areas(self) -> FloatArray:
-        """(K,) areas of the objects as others touch them, the sums of those of their parts [m²]."""
-        areas, _ = areas_and_centroids(self.part_vertices, self.part_offsets)
+        """(K,) areas of the objects as others touch them [m²]."""
         if not self.is_compound:
-            return areas
-        sums: FloatArray = np.add.reduceat(areas, self.first_parts[:-1])
-        return sums
+            return areas_and_centroids(self.part_vertices, self.part_offsets)[0]
+        return areas_and_centres([self.contact_pieces(k) for k in range(len(self))])[0]
 
     def moved_to(self, poses: ArrayLike, twists: ArrayLike | None = None) -> Movables:
         """The same objects at other poses (K, 3); at rest unless twists (K, 3) are given.
@@ -435,10 +438,18 @@ class Movables(ArrayRecord, CheckedFields):
         new = len(self) + np.flatnonzero(at < 0)
         return self._unchecked(values)._gathered(np.concatenate([index[kept], new]))
 
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take pickles of before objects had parts too."""
+        count = len(state["ids"])
+        state.setdefault("first_parts", np.arange(count + 1))
+        state.setdefault("gyration_radii", np.zeros(count))
+        super().__setstate__(state)
+
     @staticmethod
     def _unchecked(values: Mapping[str, Any]) -> Movables:
         clone = object.__new__(Movables)
-        clone.__dict__.update({key: value for key, value in values.items() if key[0] != "_"})
+        kept = {key: value for key, value in values.items() if key[0] != "_" or key in _OF_SHAPES}
+        clone.__dict__.update(kept)
         return clone
 
     def _gathered(self, index: IntArray) -> Movables:

@@ -72,7 +72,7 @@ def test_floes_as_a_camera_sees_them(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert main(["ice", str(seen)]) == 0
     told = capsys.readouterr()
     assert told.err.startswith(
-        "pushplan: note: 1 pairs of floes overlapped: 2 of 2 floes were moved"
+        "pushplan: note: floes overlapped in 1 places: 2 of 2 floes were moved"
     )
     assert told.err.count("\n") == 1 and told.out.startswith("2 floes")
     for given in ([str(seen)], ["--check", str(seen)]):

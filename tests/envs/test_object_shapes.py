@@ -11,7 +11,7 @@ import shapely
 from pushplan.envs import RolloutInteraction, make
 from pushplan.envs.tasks.object_shapes import SHAPES
 from pushplan.interaction import QuasiStatic
-from pushplan.scenarios import Scenario, suite
+from pushplan.scenarios import Scenario
 from pushplan.world import StaticMap
 
 TASKS = {"maze": {}, "area_clearing": {"layout": "walled"}, "box_delivery": {}}
@@ -67,8 +67,6 @@ def test_both_engines_push_them(preset):
     assert found.lengths[0] == pytest.approx(predicted.lengths[0], rel=0.2)
 
 
-def test_suites_have_them_and_those_without_stay_as_they_are():
-    for name in ("maze-2d-10-shapes", "area-clearing-2d-shapes", "box-delivery-2d-shapes"):
-        assert suite(name, episodes=1).scenarios[0].variations["objects"] == "many"
+def test_without_the_variation_all_are_boxes():
     world = start("maze", boxes=5).world
     assert not world.movables.is_compound and len(world.movables.parts(0)) == 1

@@ -108,5 +108,5 @@ def test_its_ice_fields_may_overlap_and_touch_the_ship(tmp_path: object) -> None
     world = original("ship_ice", ice_file=path, start_x=6.0).world
     assert len(world.movables) == 3 and world.robot_pose[1] == 1.0
     assert world.movables.masses.tolist() == pytest.approx([1.0, 1.0, 1.0])
-    with pytest.warns(OutlineWarning, match="1 pairs of floes overlapped"):
+    with pytest.warns(OutlineWarning, match="floes overlapped in 1 places"):
         PushEnv(task="ship_ice", variations={"ice_file": path})

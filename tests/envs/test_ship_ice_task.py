@@ -205,7 +205,7 @@ def test_ice_from_a_file(tmp_path):
 def test_ice_from_a_file_may_be_as_a_camera_sees_it(tmp_path):
     path = tmp_path / "seen.json"
     path.write_text("[[[1,9],[3,9],[2,9.5],[3,11],[1,11]], [[2.9,9],[4,9],[4,11],[2.9,11]]]")
-    with pytest.warns(OutlineWarning, match="1 pairs of floes overlapped"):
+    with pytest.warns(OutlineWarning, match="floes overlapped in 1 places"):
         world = task(ice_file=str(path)).start(stream(0, "layout"))
     assert [len(world.movables.parts(k)) for k in range(2)] == [2, 1]
     a, b = (

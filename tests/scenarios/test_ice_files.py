@@ -5,6 +5,7 @@ import itertools
 import json
 import os
 import pickle
+import time
 import zipfile
 
 import numpy as np
@@ -91,7 +92,7 @@ def test_overlapping_floes_are_moved_apart_and_touching_ones_are_not(tmp_path):
     path = tmp_path / "ice.json"
     polygons = [SQUARE, np.add(SQUARE, (1.0, 0.0)).tolist(), np.add(SQUARE, (0.9, 0.5)).tolist()]
     path.write_text(json.dumps({"polygons": polygons, "bounds": [0, 0, 4, 4]}))
-    with pytest.warns(OutlineWarning, match="2 pairs of floes overlapped: 1 of 3 floes were moved"):
+    with pytest.warns(OutlineWarning, match="in 2 places: 1 of 3 floes were moved"):
         field = load_ice(path)
     shapes = [shapely.Polygon(floe) for (floe,) in field.floes]
     assert not any(a.overlaps(b) for a, b in itertools.combinations(shapes, 2))
@@ -100,7 +101,10 @@ def test_overlapping_floes_are_moved_apart_and_touching_ones_are_not(tmp_path):
     kept = load_ice(path, overlaps=True)
     assert np.array_equal([floe for (floe,) in kept.floes], polygons)
     path.write_text(json.dumps({"polygons": polygons, "bounds": [0, 0, 2, 1.5]}))
-    with pytest.raises(InvalidInputError, match=r"no room to move them apart.*--overlaps"):
+    with pytest.raises(InvalidInputError, match=r"could not be moved apart.*--overlaps"):
+        load_ice(path)
+    path.write_text(json.dumps({"polygons": [SQUARE] * 3, "bounds": [0, 0, 1.5, 1.5]}))
+    with pytest.raises(InvalidInputError, match=r"3 m² in all, in 2.25 m² of water.*--overlaps"):
         load_ice(path)
     path.write_text(json.dumps(polygons[:2]))
     assert np.array_equal([floe for (floe,) in load_ice(path).floes], polygons[:2])
@@ -228,3 +232,14 @@ def test_archives_that_unpack_to_a_flood_are_refused(tmp_path):
     assert path.stat().st_size < 10**6
     with pytest.raises(SchemaError, match=r"needs 112,000,000 bytes, 100,000,000 are left"):
         load_ice(path)
+
+
+def test_floes_that_no_time_moves_apart_are_refused_in_a_moment(tmp_path):
+    path = tmp_path / "ice.json"
+    rng = np.random.default_rng(0)
+    heap = [np.add(SQUARE, at).tolist() for at in rng.uniform(0.0, 11.0, (150, 2))]
+    path.write_text(json.dumps({"polygons": heap, "bounds": [0, 0, 12.4, 12.4]}))
+    began = time.process_time()
+    with pytest.raises(InvalidInputError, match="could not be moved apart: of"):
+        load_ice(path)
+    assert time.process_time() - began < 30.0  # rounds without progress end it

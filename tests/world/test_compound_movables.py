@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pushplan.geometry import gyration_squares
+from pushplan.interaction.occupancy import ice_density
 from pushplan.world import InvalidInputError, Movables, load_world, save_world
 from pushplan.world.outline_repair import MOST_CHANGE, OutlineWarning, outline_parts
 from tests.conftest import make_u_maze
@@ -186,3 +187,32 @@ def test_any_outline_keeps_its_area_to_one_percent(points):
     given = shapely.Polygon(points.astype(np.float64))
     exact = shapely.make_valid(given, method="structure", keep_collapsed=False)
     assert found.symmetric_difference(exact).area <= 1.01 * MOST_CHANGE * exact.area
+
+
+def test_pickles_of_before_objects_had_parts_are_read():
+    movables = Movables.from_polygons([SQUARE, SQUARE])
+    state = movables.__getstate__()
+    del state["first_parts"], state["gyration_radii"]
+    old = object.__new__(Movables)
+    old.__setstate__(state)
+    assert old == movables
+
+
+def test_shapes_are_worked_out_once_for_all_poses():
+    movables = Movables.from_polygons([TABLE, L_SHAPE])
+    hulls = movables.vertices
+    assert movables.moved_to(movables.poses + 1.0).vertices is hulls
+    assert movables.holding_fixed([True, False]).vertices is hulls
+
+
+def test_parts_that_overlap_cover_their_area_once():
+    boxes = [[np.add(SQUARE, -0.5).tolist()] * 3]
+    movables = Movables.from_outlines(boxes, [[0, 0, 0]], contact_radii=0.1)
+    assert movables.contact_areas.tolist() == pytest.approx([1.44])
+    assert ice_density(make_u_maze(movables=movables)) == pytest.approx(1.0 / 1.44)
+
+
+@pytest.mark.parametrize("radius", [-1.0, 1e-200, 1e200, np.nan])
+def test_radii_of_limit_surfaces_are_numbers_that_can_be_squared(radius):
+    with pytest.raises(InvalidInputError, match="gyration_radii"):
+        Movables.from_polygons([SQUARE], gyration_radii=[radius])

@@ -124,7 +124,12 @@ class ShipIceTask(Task):
             return None
         try:
             overlaps = self.variations.ice_overlaps or self.preset.overlaps
-            field = load_ice(path, hull=self.variations.ice_hull, overlaps=overlaps)
+            field = load_ice(
+                path,
+                hull=self.variations.ice_hull,
+                overlaps=overlaps,
+                within=self.static.bounds,
+            )
         except InvalidInputError as error:
             raise ScenarioError(f"ship_ice: {error}") from error
         low = self.static.bounds[:2]

@@ -165,8 +165,8 @@ def line_up(scene: PushScene, k: int, skip: int = 0) -> LineUp | None:
         return None
     robot = scene.world.robot
     static = scene.world.static
-    outline = scene.movables.outline_world(k)
-    around = StaticMap((*static.polygons, outline), static.segments, static.radii, static.bounds)
+    parts = scene.movables.parts_world(k)
+    around = StaticMap((*static.polygons, *parts), static.segments, static.radii, static.bounds)
     towards = initial_heading(path, scene.controller.ahead)
     found = []
     for clearance in (scene.size, 0.5 * (scene.size + robot.inscribed_radius)):

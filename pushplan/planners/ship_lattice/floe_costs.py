@@ -7,7 +7,6 @@ import numpy as np
 from pushplan.motion.state_lattice.cost_map import FloeCosts
 from pushplan.planners.ship_lattice.ship_lattice_config import ShipLatticeConfig
 from pushplan.world import World
-from pushplan.world.outline import areas_and_centroids
 
 _SOFT = 0.05  # keeps the cost of a cell finite at the edge of a floe where the exponent is negative
 _DISPLACEMENT = 2.7
@@ -23,7 +22,7 @@ def floe_costs(
     floes = world.movables
     robot = world.robot
     half = max(robot.inscribed_radius, 0.1 * robot.circumscribed_radius)
-    areas = areas_and_centroids(floes.vertices, floes.offsets)[0]
+    areas = floes.contact_areas
     radii = np.sqrt(areas / np.pi)
     if config.floe_cost == "kinetic-energy":
         ship = robot.mass

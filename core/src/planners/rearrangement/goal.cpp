@@ -6,14 +6,13 @@
 
 namespace pushplan::rearrangement {
 
-GoalTest::GoalTest(const Polygons& outlines, const ObjectGoal& goal)
-    : outlines_(outlines), goal_(goal) {
+GoalTest::GoalTest(const Compounds& shapes, const ObjectGoal& goal) : shapes_(shapes), goal_(goal) {
   std::size_t most = 0;
-  for (Index k = 0; k < outlines.count(); ++k) most = std::max(most, outlines[k].size());
-  outline_.resize(most);
+  for (Index p = 0; p < shapes.parts.count(); ++p) most = std::max(most, shapes.parts[p].size());
+  part_.resize(most);
 }
 
-/// True if an object with its middle at a point could be where it belongs.
+/// True if a convex object with its middle at a point could be where it belongs.
 bool GoalTest::may_be_done(Vec2 middle) const {
   if (goal_.is_receptacle) {
     return std::none_of(goal_.edges.begin(), goal_.edges.end(), [&](const GoalEdge& edge) {
@@ -29,20 +28,27 @@ bool GoalTest::may_be_done(Vec2 middle) const {
   return false;
 }
 
-bool GoalTest::is_done(Index k, const Pose& pose) {
-  if (pose.x >= 0.5 * kRemoved) return true;
-  if (!may_be_done({pose.x, pose.y})) return false;
-  const Polygon body = outlines_[k];
-  transform(pose, body, outline_.data());
-  const Polygon outline(outline_.data(), body.size());
-  if (!goal_.is_receptacle) {
-    return convex_penetration(outline, goal_.polygon).depth < -goal_.slack;
-  }
+/// True if a part of an object, in the world frame, is where it belongs.
+bool GoalTest::is_clear(Polygon part) const {
+  if (!goal_.is_receptacle) return convex_penetration(part, goal_.polygon).depth < -goal_.slack;
   for (const GoalEdge& edge : goal_.edges) {
-    for (const Vec2 corner : outline) {
+    for (const Vec2 corner : part) {
       const double out = edge.normal.x * corner.x + edge.normal.y * corner.y;
       if (out > edge.offset - goal_.slack) return false;
     }
+  }
+  return true;
+}
+
+bool GoalTest::is_done(Index k, const Pose& pose) {
+  if (pose.x >= 0.5 * kRemoved) return true;
+  const Index first = shapes_.begin(k);
+  const Index last = shapes_.end(k);
+  if (last - first == 1 && !may_be_done({pose.x, pose.y})) return false;
+  for (Index p = first; p < last; ++p) {
+    const Polygon body = shapes_.parts[p];
+    transform(pose, body, part_.data());
+    if (!is_clear({part_.data(), body.size()})) return false;
   }
   return true;
 }

@@ -29,7 +29,7 @@ bool has_moved(const Pose& before, const Pose& after, const ObjectStep& mark) {
 PushRollout::PushRollout(const Bodies& bodies, const QuasiStaticSettings& settings,
                          const ObjectGoal& goal)
     : model_(bodies, settings),
-      goal_(bodies.objects, goal),
+      goal_(bodies.shapes, goal),
       poses_(bodies.radii.size()),
       saved_(bodies.radii.size()),
       lengths_(bodies.radii.size()),

@@ -24,11 +24,11 @@ struct ObjectGoal {
   double slack;  // by how much an object has to be clear of the polygon's edge [m]
 };
 
-/// The test of objects against their goal, with memory for one thread. The outlines and the goal
-/// have to outlive it.
+/// The test of objects against their goal, with memory for one thread: all parts of an object have
+/// to be where it belongs. The shapes and the goal have to outlive it.
 class GoalTest {
  public:
-  GoalTest(const Polygons& outlines, const ObjectGoal& goal);
+  GoalTest(const Compounds& shapes, const ObjectGoal& goal);
 
   const ObjectGoal& goal() const { return goal_; }
 
@@ -40,10 +40,11 @@ class GoalTest {
 
  private:
   bool may_be_done(Vec2 middle) const;
+  bool is_clear(Polygon part) const;
 
-  Polygons outlines_;  // in their body frames
+  Compounds shapes_;
   ObjectGoal goal_;
-  std::vector<Vec2> outline_;  // of one object in the world frame
+  std::vector<Vec2> part_;  // of one object in the world frame
 };
 
 }  // namespace pushplan::rearrangement
