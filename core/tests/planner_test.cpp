@@ -124,6 +124,16 @@ void stop_rules_end_calls() {
 }
 
 /// Pure pursuit drives a plan to its end within the limits, and stops without a pose or a plan.
+/// On a map that is too large for a table the iterations end the call too.
+void large_maps_end() {
+  Xorshift64Star random(7);
+  World world = random_room(random);
+  world.walls = {rectangle(-20.0, -0.1, -19.0, 0.1), rectangle(-20.0, 20.0, -19.0, 21.0)};
+  world.bounds = {-30.0, -30.0, 30.0, 30.0};
+  const Plan plan = pushplan::plan(world, {.search = SearchKind::kPushAware, .iterations = 4'000});
+  CHECK(plan.status == PlanStatus::kSolved || plan.status == PlanStatus::kNoPlan);
+}
+
 void pure_pursuit_arrives() {
   Xorshift64Star random(11);
   World world = random_room(random);
@@ -155,6 +165,7 @@ void pure_pursuit_arrives() {
 }  // namespace pushplan
 
 int main() {
+  pushplan::large_maps_end();
   pushplan::plans_fit_the_world();
   pushplan::wrong_worlds_are_refused();
   pushplan::stop_rules_end_calls();

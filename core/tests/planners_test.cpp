@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <numeric>
 
 #include "allocations.hpp"
 #include "check.hpp"
@@ -260,8 +261,10 @@ void goals_and_carrots_are_where_they_are() {
   const auto area = rectangle(0.0, 0.0, 4.0, 4.0);
   const std::array<GoalEdge, 4> edges{
       {{{1.0, 0.0}, 4.0}, {{-1.0, 0.0}, 0.0}, {{0.0, 1.0}, 4.0}, {{0.0, -1.0}, 0.0}}};
-  GoalTest inside(boxes.polygons(), {area, edges, true, 0.1});
-  GoalTest outside(boxes.polygons(), {area, edges, false, 0.1});
+  std::vector<Index> first(static_cast<std::size_t>(boxes.polygons().count()) + 1);
+  std::iota(first.begin(), first.end(), Index{0});
+  GoalTest inside({boxes.polygons(), first}, {area, edges, true, 0.1});
+  GoalTest outside({boxes.polygons(), first}, {area, edges, false, 0.1});
   const std::array<Pose, 4> poses{
       {{2.0, 2.0, 0.3}, {3.8, 2.0, 0.0}, {6.0, 2.0, 0.0}, {kRemoved, kRemoved, 0.0}}};
   std::array<bool, 4> done{};
