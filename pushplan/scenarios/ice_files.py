@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import warnings
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -31,7 +32,8 @@ ENDINGS = (".json", ".npz", ".npy")
 _TOUCH_RADII = 1e-6  # depth to which floes may overlap: rounding, where they touch
 _GAP_RADII = 1e-3  # that is left between floes that were moved apart; of the smaller one both
 _MOST_TESTS = 300_000  # of pairs of parts, when floes are moved apart
-_PATIENCE = 40  # rounds in which the deepest overlap has to become less
+_PATIENCE = 40  # rounds in which the deepest overlap has to become less,
+_LESS = 0.99  # by this factor
 _WAY_ON = "overlaps=True (--overlaps, the variation ice_overlaps) leaves them as they are"
 
 
@@ -243,7 +245,7 @@ def _apart(field: IceField, room: FloatArray | None) -> IceField:
         )
     first_count = len(pairs)
     depths = [max(pair.depth for pair in pairs)]
-    while pairs and tests < _MOST_TESTS and min(depths[-_PATIENCE:]) <= min(depths):
+    while pairs and tests < _MOST_TESTS and _decreases(depths):
         for a, b, depth, normal in pairs:
             share = field.areas[b] / (field.areas[a] + field.areas[b])
             way = (depth + _GAP_RADII * min(field.radii[a], field.radii[b])) * normal
@@ -273,6 +275,12 @@ def _apart(field: IceField, room: FloatArray | None) -> IceField:
         for parts, shift in zip(field.floes, shifts, strict=True)
     ]
     return IceField(tuple(floes), _bounds(floes, None if room is None else field.bounds))
+
+
+def _decreases(depths: list[float]) -> bool:
+    """True if the last rounds have brought the deepest overlap below all before, or are few."""
+    before = min(depths[:-_PATIENCE], default=math.inf)
+    return min(depths[-_PATIENCE:]) < _LESS * before
 
 
 class _Overlap(NamedTuple):

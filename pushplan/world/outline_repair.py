@@ -121,9 +121,11 @@ def _is_list_of_outlines(shape: Any) -> bool:
     if not isinstance(shape, list | tuple) or not shape:
         return False
     first = shape[0]
-    return isinstance(first, shapely.Geometry) or (
-        isinstance(first, list | tuple | np.ndarray) and len(first) > 0 and np.ndim(first[0]) == 1
-    )
+    if isinstance(first, np.ndarray):
+        return first.ndim == 2
+    if isinstance(first, list | tuple):
+        return len(first) > 0 and isinstance(first[0], list | tuple | np.ndarray)
+    return isinstance(first, shapely.Geometry)
 
 
 def disjoint_pieces(parts: ConvexParts) -> ConvexParts:

@@ -122,6 +122,8 @@ def test_a_file_gives_back_compound_objects_and_takes_concave_outlines(tmp_path)
         (shapely.Polygon(), "must be a polygon"),
         (7, "shape"),
         ("square", "must be an array"),
+        ([[[[1, 2], [3]], 2.5], [3, 2], [3, 3]], "must be an array"),
+        ([np.array(3.0)], "must have shape"),
     ],
 )
 def test_what_is_no_shape_is_one_clear_error(shape, words):
