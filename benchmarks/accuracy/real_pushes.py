@@ -132,7 +132,7 @@ def simulated(name: str, friction: float) -> Predictor:
 
 @dataclass(frozen=True)
 class PushSet:
-    """What the tables say of one file."""
+    """Rows of the tables for one file."""
 
     errors: dict[str, float]  # [mm] by predictor
     found: list[ContactParameters]  # one for each split, without knowledge of the support

@@ -52,7 +52,7 @@ def scene() -> World:
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What a `Runner` recorded while it pushed a box, which moved as a model says."""
+    """Record of a `Runner` that pushed a box, which moved as a model says."""
     path = tmp_path_factory.mktemp("log") / "robot.mcap"
     model = QuasiStatic(friction=0.5, gyration_scale=1.4)
     world = scene()
