@@ -111,3 +111,69 @@ def test_real_pushes_reads_files_of_any_number_and_length(
     rows_of = dict(re.findall(r"^\| ([^|]+) \| ([\d.]+) \|", capsys.readouterr().out, re.MULTILINE))
     assert float(rows_of["identified from all and tested on them"]) < float(rows_of["no motion"])
     assert float(rows_of["gyration of the support"]) == pytest.approx(0.90, abs=0.01)
+
+
+def barn_like(folder: Path, *, closed: bool) -> None:
+    """Write a world with a row of cylinders across the way, with a gap unless it is closed."""
+    y = np.arange(0.075, 9.6, 0.15)
+    x = np.arange(-4.425, 0.0, 0.15)
+    middle = x if closed else x[np.abs(x + 3.2) > 0.6]
+    lines = [(np.full(len(y), side), y) for side in (-4.425, -0.075)]
+    lines += [(middle, np.full(len(middle), 7.0))]
+    places = np.column_stack([np.concatenate(line) for line in zip(*lines, strict=True)])
+    cylinders = np.column_stack([places, np.full(len(places), 0.075)])
+    np.savez(folder / "worlds.npz", cylinders=cylinders, offsets=[0, len(cylinders)], first=7)
+    path = np.column_stack([np.full(30, 15), np.arange(30)])
+    np.savez(folder / "paths.npz", path_7=path)
+
+
+def test_real_maps_plans_in_worlds_and_maps_and_checks_the_plans(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from benchmarks.accuracy import real_maps
+
+    barn_like(tmp_path, closed=False)
+    pixels = np.full((40, 60), 254, np.uint8)
+    pixels[:25, 30:32] = 0
+    (tmp_path / "room.pgm").write_bytes(b"P5 60 40 255\n" + pixels.tobytes())
+    rest = "resolution: 0.1\norigin: [-1, 2, 0.3]\nnegate: 0\nfree_thresh: 0.2\n"
+    (tmp_path / "room.yaml").write_text(f"image: room.pgm\noccupied_thresh: 0.65\n{rest}")
+    (tmp_path / "torn.yaml").write_text(f"image: none.pgm\noccupied_thresh: 0.65\n{rest}")
+    folder = str(tmp_path)
+    argv = ["real_maps", "--barn", folder, "--nav2", folder, "--pairs", "1"]
+    monkeypatch.setattr(sys, "argv", argv)
+    real_maps.main()
+    rows = [line.split(" | ") for line in capsys.readouterr().out.splitlines()[3:]]
+    found = [(re.split(r"\W+", name)[1], *cells[:4]) for name, *cells in rows[1:-1]]
+    assert found == [
+        ("BARN", "`straight`", "0 of 1", "1", "0"),
+        ("BARN", "`kinodynamic-rrt`", "1 of 1", "0", "0"),
+        ("BARN", "`push-aware`", "1 of 1", "0", "0"),
+        ("room", "`straight`", "0 of 2", "2", "0"),
+        ("room", "`kinodynamic-rrt`", "2 of 2", "0", "0"),
+        ("room", "`push-aware`", "2 of 2", "0", "0"),
+    ]
+    assert rows[-1][0] == "| torn"
+    assert rows[-1][1].startswith("refused: ")
+
+
+def test_real_maps_finds_a_plan_that_touches_an_obstacle(tmp_path: Path) -> None:
+    from benchmarks.accuracy import real_maps
+    from pushplan.world import Plan
+
+    barn_like(tmp_path, closed=True)
+    case = next(iter(real_maps.barn_cases(tmp_path)))
+    end = np.array([-2.25, 12.5, np.pi / 2.0])
+
+    def plan(*poses: object) -> Plan:
+        times = np.arange(len(poses), dtype=float)
+        return Plan(times, np.array(poses), np.ones(len(poses)), np.zeros(len(poses)), 1.0)
+
+    start = case.world.robot_pose
+    assert real_maps.fault_of(case, plan(start, end), True) == "collides"
+    assert real_maps.fault_of(case, plan(start, end), False) == "collides"
+    assert real_maps.fault_of(case, plan(start, start), True) == "ends elsewhere"
+    assert real_maps.fault_of(case, plan(end, end), True) == "starts elsewhere"
+    quarter = plan([1, 0, np.pi / 2], [0, 1, np.pi])
+    places, headings = real_maps.poses_between(quarter, 0.5)
+    assert np.allclose(places, np.exp(1j * (headings - np.pi / 2)))
