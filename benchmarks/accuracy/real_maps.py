@@ -59,7 +59,7 @@ BARN_FIRST_CELL = np.array([-4.425, 5.175])  # where all references keep the sam
 OCCUPIED = 65  # least value of an occupied cell [%], as `load_nav2_map` has it
 NAV2_TOLERANCE_M = 0.25  # of a goal, Nav2's default
 NAV2_LEAST_WAY = 0.25  # from a start to its goal, as a fraction of the map's extent
-FITS = 0.3  # fraction of the free cells that the Jackal must reach, or it is the TurtleBot
+FITS = 0.4  # fraction of the free cells that the Jackal must reach, or it is the TurtleBot
 
 STEP_M = 0.005  # way of the farthest corner between two poses that are checked, at most
 TOUCH = 1e-5  # fraction by which the checked footprint is smaller, as plans may touch
@@ -227,7 +227,7 @@ def main() -> None:
     parser = command_line(__doc__, seed=0)
     parser.add_argument("--barn", type=Path, metavar="FOLDER", help="of worlds.npz and paths.npz")
     parser.add_argument("--nav2", type=Path, metavar="FOLDER", help="of .yaml files of maps")
-    parser.add_argument("--patience", type=float, default=10.0, help="deadline [s]; default 10")
+    parser.add_argument("--patience", type=float, default=60.0, help="deadline [s]; default 60")
     parser.add_argument("--pairs", type=int, default=10, help="twice on each map; default 10")
     parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="of calls that failed")
     options = parser.parse_args()
