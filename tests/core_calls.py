@@ -140,6 +140,8 @@ VALID: dict[str, Any] = {
     "geometry.Obstacles.fill_clearance.last": 16,
     "geometry.GoalScene.fill_distances.out": np.zeros((4, 4)),
     "geometry.VisibilitySearch.start": [-2.0, -2.0],
+    "geometry.GoalEstimate.start": [-2.0, -2.0],
+    "geometry.CoveredSides.box": WIDE,
     "geometry.relax.starts": [0, 1, 2],
     "geometry.relax.ends": [1, 0],
     "geometry.segment_crossings.first": np.array([[0.0, 0.0, 1.0, 1.0]]),
@@ -449,7 +451,7 @@ class Caller:
             return tuple(self.valid(owner, part) for part in parts)
         if wanted.kind == "list":
             return [self.valid(owner, parameter("item", wanted.dtype)) for _ in range(2)]
-        if wanted.kind.startswith("object"):
+        if wanted.kind.startswith("object") or wanted.kind.endswith(" | None"):
             return None
         return self.instance(wanted.kind)
 

@@ -6,6 +6,7 @@
 #include "arrays.hpp"
 #include "pushplan/geometry/convex.hpp"
 #include "pushplan/geometry/distance_field.hpp"
+#include "pushplan/geometry/goal_estimate.hpp"
 #include "pushplan/geometry/obstacle_grid.hpp"
 #include "pushplan/geometry/obstacles.hpp"
 #include "pushplan/geometry/polygon.hpp"
@@ -386,6 +387,31 @@ void bind_path_search(nb::module_& module) {
           "halves"_a.noconvert(), nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(),
           nb::keep_alive<1, 4>(), nb::keep_alive<1, 5>(), nb::keep_alive<1, 6>(),
           nb::keep_alive<1, 7>(), nb::keep_alive<1, 8>());
+  nb::class_<CoveredSides>(module, "CoveredSides",
+                           "Cells over a map, and which sides between them are covered.")
+      .def(
+          "__init__",
+          [](CoveredSides* self, const Corners& corners, const BoxArray& bounds, double cell) {
+            const Box around = box(bounds);
+            require_finite("box", around.x_max - around.x_min + (around.y_max - around.y_min));
+            require_finite("cell", cell);
+            new (self) CoveredSides({corners.points.first(corners.owner.size()), corners.first},
+                                    around, cell);
+          },
+          "corners"_a, "box"_a.noconvert(), "cell"_a, ReleaseGil())
+      .def_prop_ro("shape", [](const CoveredSides& s) { return std::tuple(s.rows(), s.columns()); })
+      .def_prop_ro("cell", &CoveredSides::cell);
+  nb::class_<GoalEstimate>(module, "GoalEstimate", "Estimates of the way to a goal.")
+      .def(
+          "__init__",
+          [](GoalEstimate* self, const CoveredSides& cells, const GoalScene& scene,
+             const OnePoint& start) {
+            new (self) GoalEstimate(cells, scene.regions, point(start));
+          },
+          "cells"_a, "scene"_a, "start"_a.noconvert(), nb::keep_alive<1, 2>(), ReleaseGil())
+      .def(
+          "at", [](const GoalEstimate& s, double x, double y) { return s.from({x, y}); }, "x"_a,
+          "y"_a);
   nb::enum_<VisibilitySearch::Outcome>(module, "SearchOutcome")
       .value("FOUND", VisibilitySearch::Outcome::kFound)
       .value("EXHAUSTED", VisibilitySearch::Outcome::kExhausted)
@@ -394,12 +420,14 @@ void bind_path_search(nb::module_& module) {
       .def(
           "__init__",
           [](VisibilitySearch* self, const OnePoint& start, const Corners& corners,
-             const GoalScene& scene, const ObstacleGrid& grid, double sliver) {
+             const GoalScene& scene, const ObstacleGrid& grid, double sliver,
+             const GoalEstimate* estimate) {
             require_count("corners", corners.middles.size(), scene.obstacles.count());
-            new (self) VisibilitySearch(point(start), corners, scene, grid, sliver);
+            new (self) VisibilitySearch(point(start), corners, scene, grid, sliver, estimate);
           },
           "start"_a.noconvert(), "corners"_a, "scene"_a, "grid"_a, "sliver"_a,
-          nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>(), nb::keep_alive<1, 5>(), ReleaseGil())
+          "estimate"_a = nb::none(), nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>(),
+          nb::keep_alive<1, 5>(), nb::keep_alive<1, 7>(), ReleaseGil())
       .def("run", &VisibilitySearch::run, "budget"_a, ReleaseGil())
       .def_prop_ro("end", &VisibilitySearch::end)
       .def_prop_ro(

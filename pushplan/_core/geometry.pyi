@@ -164,6 +164,24 @@ class Corners:
 
     def __init__(self, points: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], incoming: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], outgoing: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], owner: Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C', device='cpu', writable=False)], first: Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C', device='cpu', writable=False)], middles: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], halves: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> None: ...
 
+class CoveredSides:
+    """Cells over a map, and which sides between them are covered."""
+
+    def __init__(self, corners: Corners, box: Annotated[NDArray[numpy.float64], dict(shape=(4), order='C', device='cpu', writable=False)], cell: float) -> None: ...
+
+    @property
+    def shape(self) -> tuple[int, int]: ...
+
+    @property
+    def cell(self) -> float: ...
+
+class GoalEstimate:
+    """Estimates of the way to a goal."""
+
+    def __init__(self, cells: CoveredSides, scene: GoalScene, start: Annotated[NDArray[numpy.float64], dict(shape=(2), order='C', device='cpu', writable=False)]) -> None: ...
+
+    def at(self, x: float, y: float) -> float: ...
+
 class SearchOutcome(enum.Enum):
     FOUND = 0
 
@@ -174,7 +192,7 @@ class SearchOutcome(enum.Enum):
 class VisibilitySearch:
     """Lazy A* over the visibility graph."""
 
-    def __init__(self, start: Annotated[NDArray[numpy.float64], dict(shape=(2), order='C', device='cpu', writable=False)], corners: Corners, scene: GoalScene, grid: ObstacleGrid, sliver: float) -> None: ...
+    def __init__(self, start: Annotated[NDArray[numpy.float64], dict(shape=(2), order='C', device='cpu', writable=False)], corners: Corners, scene: GoalScene, grid: ObstacleGrid, sliver: float, estimate: GoalEstimate | None = None) -> None: ...
 
     def run(self, budget: int) -> SearchOutcome: ...
 

@@ -18,6 +18,8 @@ from pushplan.geometry.shortest_path import Path, ends_on_rims, leave_inflation,
 from pushplan.world import Goal, StaticMap
 from pushplan.world.checks import FloatArray, IntArray, array, expect, number
 
+MANY_CORNERS = 10_000
+"""Corners of a map from which on a path that is nearly the shortest is good enough."""
 _BUDGET = 20_000  # work of a search between two looks at a stop rule: about a millisecond
 
 
@@ -25,7 +27,8 @@ class VisibilityGraph:
     """Shortest paths for a disc-shaped robot among the obstacles of one map.
 
     Straight walls and polygons are exact; where a path bends around an arc (a thick segment's end,
-    a corner at a clearance), that arc comes out at most 0.07 % too long. Paths stay inside
+    a corner at a clearance), that arc comes out at most 0.07 % too long. On maps with more than
+    `MANY_CORNERS` corners the path found may be 5 % longer than the shortest. Paths stay inside
     ``static.bounds`` and may touch obstacles; obstacles that touch each other leave no passage.
     Only what a path may need of the graph is made. `goal_distances` makes all of it, and pays where
     many paths lead to one goal.
@@ -84,18 +87,24 @@ class VisibilityGraph:
         scene = core.GoalScene(regions, around, static.bounds, gap)
         contours = contours_of(static, clearance)
         points = np.concatenate([contours.corners, ends_on_rims(static, clearance, regions)])
+        corners = core.Corners(
+            points,
+            contours.incoming,
+            contours.outgoing,
+            contours.owner,
+            *_boxes_of(static, clearance),
+        )
+        estimate = None
+        if len(contours.corners) > MANY_CORNERS:
+            sides = core.CoveredSides(corners, static.bounds, clearance)
+            estimate = core.GoalEstimate(sides, scene, free)
         search = core.VisibilitySearch(
             free,
-            core.Corners(
-                points,
-                contours.incoming,
-                contours.outgoing,
-                contours.owner,
-                *_boxes_of(static, clearance),
-            ),
+            corners,
             scene,
             _obstacle_grid(static, clearance),
             standoff_of(static, clearance),
+            estimate,
         )
         outcome = core.SearchOutcome.PAUSED
         while outcome == core.SearchOutcome.PAUSED:

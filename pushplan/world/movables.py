@@ -229,7 +229,8 @@ class Movables(ArrayRecord, CheckedFields):
         centres = areas_and_centres([disjoint(parts) for parts in shapes])[1]
         poses = np.column_stack([centres, np.zeros(len(shapes))])
         outlines = [
-            [part - centre for part in parts] for parts, centre in zip(shapes, centres, strict=True)
+            tuple(part - centre for part in parts)
+            for parts, centre in zip(shapes, centres, strict=True)
         ]
         return cls.from_outlines(outlines, poses, **options)
 

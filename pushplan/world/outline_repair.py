@@ -18,7 +18,9 @@ from pushplan.world.outline import (
     convex_hull,
     convex_outline,
     counter_clockwise,
+    flatten,
     listed,
+    well_formed,
 )
 
 MOST_CHANGE = 0.01
@@ -95,15 +97,26 @@ def cut_outlines(
     name: str, shapes: Sequence[Any], called: Callable[[int], str]
 ) -> list[ConvexParts]:
     """The convex parts of each of some shapes; see `pushplan.world.convex_shapes.shapes_of`."""
-    found = []
-    changed: list[OutlineParts] = []
+    named: list[list[tuple[str, Any]]] = []  # of each shape its outlines, with what they are called
     for i, shape in enumerate(listed(name, shapes)):
         if _is_list_of_outlines(shape):
-            cut = [outline_parts(f"{called(i)}, part {j}", each) for j, each in enumerate(shape)]
+            named.append([(f"{called(i)}, part {j}", each) for j, each in enumerate(shape)])
         else:
-            cut = [outline_parts(called(i), shape)]
-        found.append(tuple(part for each in cut for part in each.parts))
-        changed += [each for each in cut if each.repaired or each.change > _SLIVER]
+            named.append([(called(i), shape)])
+    convex = iter(_convex_ones([outline for outlines in named for _, outline in outlines]))
+    found = []
+    changed: list[OutlineParts] = []
+    for outlines in named:
+        parts: list[FloatArray] = []
+        for label, outline in outlines:
+            if next(convex):
+                parts.append(outline)
+                continue
+            cut = outline_parts(label, outline)
+            parts += cut.parts
+            if cut.repaired or cut.change > _SLIVER:
+                changed.append(cut)
+        found.append(tuple(parts))
     if changed:
         most = max(each.change for each in changed)
         warnings.warn(
@@ -113,6 +126,22 @@ def cut_outlines(
             stacklevel=4,
         )
     return found
+
+
+def _convex_ones(outlines: list[Any]) -> list[bool]:
+    """Which outlines are arrays that need no repair: a quick look at all of them at once."""
+    plain = [
+        isinstance(one, np.ndarray)
+        and one.dtype == np.float64
+        and one.ndim == 2
+        and one.shape[1] == 2
+        and len(one) >= 3
+        for one in outlines
+    ]
+    good = iter(
+        well_formed(*flatten([one for one, is_it in zip(outlines, plain, strict=True) if is_it]))
+    )
+    return [is_it and bool(next(good)) for is_it in plain]
 
 
 def _is_list_of_outlines(shape: Any) -> bool:

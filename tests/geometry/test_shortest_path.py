@@ -17,6 +17,7 @@ from pushplan.geometry import (
     clearance_field,
     geodesic_field,
     goal_distances,
+    visibility_graph,
 )
 from pushplan.world import GoalDisc, GoalLine, InvalidInputError, StaticMap
 
@@ -29,6 +30,13 @@ U_WALLS = [
 ]
 U_MAZE = StaticMap.build([], U_WALLS, 0.5, bounds=[0, 0, 15, 15])
 GOAL = GoalDisc(np.array([3.75, 3.75]), 1.86)
+
+
+@pytest.fixture(params=[False, True], ids=["small", "large"])
+def either_size(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Searches as on small maps, and with the estimates that large maps need."""
+    if request.param:
+        monkeypatch.setattr("pushplan.geometry.visibility_graph.MANY_CORNERS", 0)
 
 
 def free_space(static: StaticMap, clearance: float) -> shapely.Geometry:
@@ -227,6 +235,7 @@ def test_start_in_the_goal_has_no_way_to_go() -> None:
     np.testing.assert_array_equal(path.points, [[3.0, 3.0]])
 
 
+@pytest.mark.usefixtures("either_size")
 def test_a_sealed_goal_cannot_be_reached() -> None:
     box = [[4, 4, 6, 4], [6, 4, 6, 6], [6, 6, 4, 6], [4, 6, 4, 4]]
     static = StaticMap.build([], box, 0.0, bounds=[0, 0, 10, 10])
@@ -241,6 +250,7 @@ def test_a_sealed_goal_cannot_be_reached() -> None:
     assert math.isinf(VisibilityGraph(U_MAZE).to_goal((2.0, 2.0), buried).length)
 
 
+@pytest.mark.usefixtures("either_size")
 def test_touching_blocks_leave_no_passage_but_slits_do() -> None:
     left = np.array([[0, 4], [5, 4], [5, 6], [0, 6]], float)
     for slit, open_ in ((0.0, False), (1e-3, True)):
@@ -350,6 +360,7 @@ def test_bounds_that_cells_do_not_fill_leave_the_rest_unreached() -> None:
     assert np.isfinite(field.values[:, :-1]).all()
 
 
+@pytest.mark.usefixtures("either_size")
 @pytest.mark.parametrize("seed", range(12))
 def test_the_lazy_search_finds_what_the_complete_graph_holds(seed: int) -> None:
     rng = np.random.default_rng(200 + seed)
@@ -364,7 +375,8 @@ def test_the_lazy_search_finds_what_the_complete_graph_holds(seed: int) -> None:
         for start in rng.uniform(0, 10, (8, 2)):
             path = VisibilityGraph(static, clearance).to_goal(start, goal)
             expected = complete.path_from(start)
-            assert path.length == pytest.approx(expected.length, rel=3e-7)  # within the gap
+            longest = 1.05 if visibility_graph.MANY_CORNERS == 0 else 1.0 + 3e-7
+            assert (1.0 - 3e-7) * expected.length <= path.length <= longest * expected.length
             if math.isfinite(path.length):
                 assert np.hypot(*np.diff(path.points, axis=0).T).sum() == pytest.approx(path.length)
 

@@ -15,26 +15,41 @@ std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 }  // namespace
 
 VisibilitySearch::VisibilitySearch(Vec2 start, const Corners& corners, const GoalScene& scene,
-                                   const ObstacleGrid& grid, double sliver)
+                                   const ObstacleGrid& grid, double sliver,
+                                   const GoalEstimate* estimate)
     : start_(start),
       corners_(corners),
       scene_(scene),
       cell_(grid.cell()),
       sliver_(sliver),
+      estimate_(estimate),
       sight_(grid),
       bounds_(corners.middles.size()),
-      done_(corners.points.size(), 0),
+      lengths_(corners.points.size(), kInfinity),
       parents_(corners.points.size(), kStart) {
   for (std::size_t k = 0; k < bounds_.size(); ++k) {
     const double half = std::hypot(corners.halves[k].x, corners.halves[k].y);
     bounds_[k] = region_distance(corners.middles[k], scene.regions) - half;
+    if (estimate == nullptr) continue;
+    double least = kInfinity;
+    for (std::size_t j = at(corners.first[k]); j < at(corners.first[k + 1]); ++j) {
+      least = std::min(least, estimate->from(corners.points[j]));
+    }
+    bounds_[k] = std::max(bounds_[k], least);
   }
+  if (estimate != nullptr && std::isinf(estimate->from(start))) return;  // no way leads there
   heap_.reserve(8 * corners.points.size() + 64);
   expand(kStart, 0.0, -kInfinity);
 }
 
 Vec2 VisibilitySearch::place(Index node) const {
   return node == kStart ? start_ : corners_.points[at(node)];
+}
+
+/// The estimate of what is left of a path at `p` [m].
+double VisibilitySearch::left(Vec2 p) const {
+  const double straight = region_distance(p, scene_.regions);
+  return estimate_ == nullptr ? straight : std::max(straight, estimate_->from(p));
 }
 
 /// Puts a way of getting to a node into the heap.
@@ -54,12 +69,17 @@ void VisibilitySearch::expand(Index node, double length, double low) {
   const Index own = from_start ? -1 : corners_.owner[at(node)];
   const Vec2 in = from_start ? Vec2{0.0, 0.0} : corners_.incoming[at(node)];
   const Vec2 out = from_start ? Vec2{0.0, 0.0} : corners_.outgoing[at(node)];
-  const double straight = region_distance(p, scene_.regions);
-  double high = straight + 2.0 * (low - straight);
+  const double near = left(p);
+  double high = near + 2.0 * (low - near);
   bool rest = false;
   if (low == -kInfinity) {
-    high = straight + cell_;
-    const double leg = goal_leg(p, scene_).length;
+    high = near + cell_;
+    double leg = kInfinity;
+    for (Index k = 0; k < scene_.regions.count(); ++k) {
+      const Vec2 q = nearest_in_region(k, p, scene_.regions);
+      const double away = std::hypot(q.x - p.x, q.y - p.y);
+      if (away < leg && scene_.box.contains(q, gap) && sight_.sees(p, q, gap)) leg = away;
+    }
     if (leg < kInfinity) offer(goal_node(), length + leg, 0.0, node);
     for (std::size_t j = corners_.owner.size(); j < corners_.points.size(); ++j) {
       const double dx = corners_.points[j].x - p.x;
@@ -95,7 +115,7 @@ void VisibilitySearch::expand(Index node, double length, double low) {
       if (!((before >= -b && after <= a) || (before <= b && after >= -a))) continue;
     }
     for (std::size_t j = at(corners_.first[k]); j < at(corners_.first[k + 1]); ++j) {
-      if (done_[j]) continue;
+      if (length >= lengths_[j]) continue;
       const Vec2 q = corners_.points[j];
       if (!scene_.box.contains(q, gap)) continue;
       const double dx = q.x - p.x;
@@ -103,11 +123,16 @@ void VisibilitySearch::expand(Index node, double length, double low) {
       if (!every && !bends.tangent({-dx, -dy}, j, gap)) continue;
       if (!from_start && !bends.tangent({dx, dy}, at(node), gap)) continue;
       const double step = std::hypot(dx, dy);
-      const double bound = region_distance(q, scene_.regions);
-      if (step + bound > high) {
-        rest = true;
-      } else if (step + bound > low) {
-        offer(static_cast<Index>(j), length + step, bound, node);
+      if (length + step >= lengths_[j]) continue;
+      const double far = left(q);
+      if (step + far > high) {
+        rest = rest || far < kInfinity;
+      } else if (step + far > low) {
+        if (std::isinf(lengths_[j]) && !sight_.sees(q, q, gap)) {
+          lengths_[j] = 0.0;  // inside of another obstacle: never to be reached
+          continue;
+        }
+        offer(static_cast<Index>(j), length + step, far, node);
       }
     }
   }
@@ -132,10 +157,10 @@ VisibilitySearch::Outcome VisibilitySearch::run(Index budget) {
       continue;
     }
     const std::size_t node = at(entry.node);
-    if (done_[node]) continue;
+    if (entry.length >= lengths_[node]) continue;
     budget -= kLineWork;
     if (!sight_.sees(place(entry.before), corners_.points[node], scene_.gap)) continue;
-    done_[node] = 1;
+    lengths_[node] = entry.length;
     parents_[node] = entry.before;
     if (node >= corners_.owner.size()) {
       end_ = entry.node;

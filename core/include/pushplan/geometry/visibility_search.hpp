@@ -12,6 +12,7 @@
 #include <span>
 #include <vector>
 
+#include "pushplan/geometry/goal_estimate.hpp"
 #include "pushplan/geometry/obstacle_grid.hpp"
 #include "pushplan/geometry/visibility.hpp"
 
@@ -40,8 +41,10 @@ class VisibilitySearch {
 
   VisibilitySearch(Vec2 start, const Corners& corners, const GoalScene& scene,
                    const ObstacleGrid& grid,
-                   double sliver);  // a place this close to an obstacle may be inside of the
-                                    // outline around it [m]
+                   double sliver,  // a place this close to an obstacle may be inside of
+                                   // the outline around it [m]
+                   const GoalEstimate* estimate);  // null for straight distances, with which the
+                                                   // path found is the shortest
 
   /// Goes on for about `budget` corners looked at, or lines tested.
   Outcome run(Index budget);
@@ -71,16 +74,18 @@ class VisibilitySearch {
   Vec2 place(Index node) const;
   void offer(Index node, double length, double bound, Index before, double limit = 0.0);
   void expand(Index node, double length, double low);
+  double left(Vec2 p) const;
 
   Vec2 start_;
   Corners corners_;
   const GoalScene& scene_;
   double cell_;
   double sliver_;
+  const GoalEstimate* estimate_;
   GridSight sight_;
   std::vector<double>
-      bounds_;              // (C,) from any corner of an obstacle at least as far to the goal [m]
-  std::vector<char> done_;  // (V + E,)
+      bounds_;  // (C,) from any corner of an obstacle at least as far to the goal [m]
+  std::vector<double> lengths_;  // (V + E,) of the shortest path found to each node [m]
   std::vector<Index> parents_;
   std::vector<Entry> heap_;
   Index entries_ = 0;
