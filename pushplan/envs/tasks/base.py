@@ -13,7 +13,6 @@ import numpy as np
 from pushplan.envs.simulators.base import Materials
 from pushplan.envs.tasks.presets import SOLIDS, Preset
 from pushplan.envs.tasks.variations import TaskVariations
-from pushplan.geometry import gyration_squares
 from pushplan.observation import ObservationBuilder, StateObservation
 from pushplan.world import (
     Drive,
@@ -25,14 +24,6 @@ from pushplan.world import (
 )
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, choice
 from pushplan.world.stored.robots import ROBOTS, make_robot, robots
-
-_FRICTIONS = {
-    "bumper_friction": "robot_object",
-    "object_friction": "object_object",
-    "wall_friction": "object_static",
-    "ground_friction": "object_ground",
-}
-"""Variation -> the field of `Materials` that it replaces."""
 
 
 @dataclass(frozen=True)
@@ -176,9 +167,7 @@ class Task(ABC):
         """Set robot, materials, control step and slowness: the preset and what departs from it."""
         preset = self.preset
         wanted = self.variations
-        frictions = {field: getattr(wanted, name) for name, field in _FRICTIONS.items()}
-        asked = {field: value for field, value in frictions.items() if value is not None}
-        self.materials = replace(preset.materials, **asked)
+        self.materials = wanted.change_materials(preset.materials)
         if wanted.wheeled and self.materials.water is not None:
             raise ScenarioError(
                 f"{self.name}: wheeled must be 0 in a preset with water, got {wanted.wheeled:g}"
@@ -213,8 +202,6 @@ class Task(ABC):
     def varied(self, world: World, rng: np.random.Generator) -> tuple[World, Materials]:
         """Draw masses, limit surfaces, casters and friction as the variations ask for.
 
-        A share of objects on casters that the start has already stays as it is.
-
         Args:
             world: a new start.
             rng: the only source of randomness.
@@ -223,27 +210,8 @@ class Task(ABC):
             The start, and the materials that it has.
         """
         wanted = self.variations
-        objects = world.movables
-        count = len(objects)
-        frictions = wanted.friction_spread ** rng.uniform(-1.0, 1.0, len(_FRICTIONS))
-        logs = rng.uniform(-1.0, 1.0, (count, 2))
-        order = rng.permutation(count)
-        if wanted.wheeled is not None:
-            on_casters = round(wanted.wheeled * count)
-            if on_casters != objects.wheeled.sum():
-                objects = replace(objects, wheeled=np.isin(np.arange(count), order[:on_casters]))
-        self._nominal = objects
-        if wanted.mass_scale != 1.0 or wanted.mass_spread > 1.0:
-            factors = wanted.mass_scale * wanted.mass_spread ** logs[:, 0]
-            objects = replace(objects, masses=objects.masses * factors)
-        if wanted.gyration_spread > 1.0:
-            radii = np.sqrt(gyration_squares(objects)) * wanted.gyration_spread ** logs[:, 1]
-            objects = replace(objects, gyration_radii=radii)
-        materials = self.materials
-        if wanted.friction_spread > 1.0:
-            drawn = zip(_FRICTIONS.values(), frictions.tolist(), strict=True)
-            changes = {name: factor * getattr(materials, name) for name, factor in drawn}
-            materials = replace(materials, **changes)
+        materials = wanted.vary_materials(self.materials, rng)
+        self._nominal, objects = wanted.vary_objects(world.movables, rng)
         if objects is not world.movables:
             world = replace(world, movables=objects)
         return world, materials
