@@ -217,7 +217,9 @@ class Task(ABC):
         return world, materials
 
     def told(self, world: World) -> World:
-        """Return the scene that a policy gets to see: all of it, unless the task says otherwise.
+        """Return the scene that a policy gets to see.
+
+        It is the true one, with nominal masses and limit surfaces where these are unknown.
 
         Args:
             world: the scene as the simulator has it.
