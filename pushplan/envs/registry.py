@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
 
 from pushplan.imports.on_demand import Registered, look_up
 
@@ -44,16 +43,6 @@ def goal_kind(task: str, variations: Mapping[str, object] | None = None) -> str 
         return None
     kind: str = look_up("task", TASKS, task).goal_kind_of(variations or {})
     return kind
-
-
-def variation_names(task: str) -> set[str]:
-    """Return the names of the presets of a task that can be varied.
-
-    Raises:
-        UnknownNameError: if there is no such task.
-    """
-    kind = look_up("task", TASKS, task).variation_class
-    return {field.name for field in fields(kind)}
 
 
 def default_preset(task: str, simulator: str) -> str:

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.envs.registry import variation_names
 from pushplan.evaluation.benchmark import suites_of
 from pushplan.evaluation.report.tables import Table, heading
 from pushplan.evaluation.run.batch import Progress, run_batch
@@ -147,8 +146,8 @@ def stress(
     Args:
         policy: a name, ``"module:Class"``, ``"file.py:Class"``, or a callable that makes one.
         suite: name of a suite, a `pushplan.scenarios.Suite`, or a list of scenarios.
-        conditions: names of `CONDITIONS`, or conditions of your own by name; all that the task
-            has the variations for by default. `UNDISTURBED` is always run too.
+        conditions: names of `CONDITIONS`, all by default, or conditions of your own by name.
+            `UNDISTURBED` is always run too.
         episodes: scenarios of a suite by name.
         seed: of the first scenario of a suite by name.
         rate: of the robot's loop where a condition does not say [Hz].
@@ -168,7 +167,7 @@ def stress(
     scenarios = chosen.scenarios
     if not scenarios:
         raise InvalidInputError("a stress test needs at least one scenario")
-    wanted = _conditions(conditions, scenarios)
+    wanted = _conditions(conditions)
     spec = parse_policy(policy)
     misfits([spec], [chosen], JobSettings())
     jobs = []
@@ -205,9 +204,7 @@ def _disturbed(
     return DisturbedPolicy(spec.make(), disturbances, period=period, planning_time=planning_time)
 
 
-def _conditions(
-    given: Sequence[str] | Mapping[str, Condition] | None, scenarios: Sequence[Any]
-) -> dict[str, Condition]:
+def _conditions(given: Sequence[str] | Mapping[str, Condition] | None) -> dict[str, Condition]:
     if isinstance(given, Mapping):
         return {UNDISTURBED: CONDITIONS[UNDISTURBED], **given}
     if given is not None:
@@ -215,9 +212,7 @@ def _conditions(
             if name not in CONDITIONS:
                 raise UnknownNameError("condition", name, CONDITIONS)
         return {name: CONDITIONS[name] for name in dict.fromkeys((UNDISTURBED, *given))}
-    tasks = {scenario.task for scenario in scenarios}
-    known = set.intersection(*(variation_names(task) for task in tasks))
-    return {name: one for name, one in CONDITIONS.items() if known.issuperset(one.variations)}
+    return dict(CONDITIONS)
 
 
 def _judged(

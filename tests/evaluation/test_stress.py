@@ -7,7 +7,7 @@ import pytest
 from pushplan.evaluation import Condition, stress
 from pushplan.evaluation.stress_testing import CONDITIONS, UNDISTURBED
 from pushplan.runtime.disturbances import Disturbances
-from pushplan.world import InvalidInputError, UnknownNameError
+from pushplan.world import InvalidInputError, Twist, UnknownNameError
 
 
 def test_a_policy_that_stands_it_misses_nothing():
@@ -51,7 +51,25 @@ def test_what_makes_no_sense_is_one_error():
 
 
 @pytest.mark.slow
-def test_by_default_all_conditions_that_the_task_has_the_variations_for():
+def test_by_default_all_conditions_on_any_task():
     ran = [row.condition for row in stress("random", "ship-ice-2d-0", episodes=1, workers=0).rows]
-    assert ran == [name for name, one in CONDITIONS.items() if not one.variations]
-    assert "friction-0" not in ran
+    assert ran == list(CONDITIONS)
+
+
+def test_under_unknown_parameters_a_policy_is_told_the_nominal_ones():
+    episodes = []
+
+    class Straight:
+        actions = ("velocity",)
+
+        def reset(self, world, rng):
+            episodes.append(world.movables)
+
+        def act(self, world, observation=None):
+            return Twist(0.1, 0.0)
+
+    given = {"conditions": ["parameters-unknown"], "episodes": 2, "seed": 3, "workers": 0}
+    rows = stress(Straight, "maze-3d-3", **given).rows
+    assert [row.condition for row in rows] == [UNDISTURBED, "parameters-unknown"]
+    assert episodes and all((objects.masses == 0.1).all() for objects in episodes)
+    assert stress(Straight, "maze-3d-3", **given).rows == rows

@@ -25,13 +25,6 @@ from pushplan.world import (
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, choice
 from pushplan.world.stored.robots import ROBOTS, make_robot, robots
 
-_FRICTIONS = {
-    "bumper_friction": "robot_object",
-    "object_friction": "object_object",
-    "wall_friction": "object_static",
-}
-"""Variation -> the field of `Materials` that it replaces."""
-
 
 @dataclass(frozen=True)
 class StepOutcome:
@@ -106,7 +99,7 @@ class Task(ABC):
 
     preset: Preset
     """The dimensions, one of the values of `preset_table`."""
-    variations: Any
+    variations: Any = TaskVariations()
 
     def __init__(
         self,
@@ -174,9 +167,11 @@ class Task(ABC):
         """Set robot, materials, control step and slowness: the preset and what departs from it."""
         preset = self.preset
         wanted = self.variations
-        frictions = {field: getattr(wanted, name, None) for name, field in _FRICTIONS.items()}
-        asked = {field: value for field, value in frictions.items() if value is not None}
-        self.materials = replace(preset.materials, **asked)
+        self.materials = wanted.change_materials(preset.materials)
+        if wanted.wheeled and self.materials.water is not None:
+            raise ScenarioError(
+                f"{self.name}: wheeled must be 0 in a preset with water, got {wanted.wheeled:g}"
+            )
         self.robot = wanted.limit(robot)
         self.control_step = wanted.control_step or preset.control_step
         speed = robot.max_speed
@@ -204,13 +199,36 @@ class Task(ABC):
             ScenarioError: if the request cannot be met, such as too many boxes.
         """
 
+    def varied(self, world: World, rng: np.random.Generator) -> tuple[World, Materials]:
+        """Draw masses, limit surfaces, casters and friction as the variations ask for.
+
+        Args:
+            world: a new start.
+            rng: the only source of randomness.
+
+        Returns:
+            The start, and the materials that it has.
+        """
+        wanted = self.variations
+        materials = wanted.vary_materials(self.materials, rng)
+        self._nominal, objects = wanted.vary_objects(world.movables, rng)
+        if objects is not world.movables:
+            world = replace(world, movables=objects)
+        return world, materials
+
     def told(self, world: World) -> World:
-        """Return the scene that a policy gets to see: all of it, unless the task says otherwise.
+        """Return the scene that a policy gets to see.
+
+        It is the true one, with nominal masses and limit surfaces where these are unknown.
 
         Args:
             world: the scene as the simulator has it.
         """
-        return world
+        if self.variations.parameters == "known":
+            return world
+        objects = world.movables
+        nominal = self._nominal.select(np.isin(self._nominal.ids, objects.ids))
+        return replace(world, movables=nominal.moved_to(objects.poses, objects.twists))
 
     objects_leave: bool = False
     """True if objects can leave the floor, so that `leaving` has to be asked."""

@@ -304,7 +304,7 @@ def place_boxes(
         **rules,
     )
     on_casters = np.zeros(count, dtype=bool)
-    on_casters[rng.permutation(count)[: round(wanted.wheeled * count)]] = True
+    on_casters[rng.permutation(count)[: round((wanted.wheeled or 0.0) * count)]] = True
     masses = None
     if preset.box_mass is not None:
         masses = np.full(count, preset.box_mass)

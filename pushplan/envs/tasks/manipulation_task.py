@@ -25,13 +25,7 @@ from pushplan.world import (
     StaticMap,
     World,
 )
-from pushplan.world.checked_fields import (
-    Fraction,
-    NonNegativeFloat,
-    OneOf,
-    PositiveFloat,
-    PositiveInt,
-)
+from pushplan.world.checked_fields import OneOf, PositiveFloat, PositiveInt
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, choice
 
 LEAST_SIZE = 0.01
@@ -54,11 +48,9 @@ class ManipulationVariations(TaskVariations):
     box_size: PositiveFloat | None = None
     objects: Objects = "boxes"  # shapes: ``"boxes"``, or ``"many"`` of them
     box_yaw: Yaw  # headings of the boxes at the start, ``"aligned"`` or ``"random"``
-    wheeled: Fraction = 0.0  # fraction of the boxes that stand on casters, 0 to 1
     robot: str | None = None  # one of the preset's robots
     # one of `pushplan.world.BUMPERS`, where the robot's can be changed
     bumper: Annotated[str, OneOf(BUMPERS)] | None = None
-    bumper_friction: NonNegativeFloat | None = None  # friction coefficient between robot and boxes
     random_start: bool  # True for a random start of the robot
     touching: bool | None = None  # True if boxes may start in touch with the robot
     # time without progress after which the episode is cut off [s], whatever the action mode

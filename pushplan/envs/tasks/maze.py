@@ -23,13 +23,7 @@ from pushplan.envs.tasks.variations import Objects, TaskVariations, Yaw
 from pushplan.geometry.distance_field import GeodesicField, geodesic_field
 from pushplan.observation import ImageObservation
 from pushplan.world import BUMPERS, GoalDisc, ScenarioError, StaticMap, World
-from pushplan.world.checked_fields import (
-    Fraction,
-    NonNegativeFloat,
-    NonNegativeInt,
-    OneOf,
-    PositiveFloat,
-)
+from pushplan.world.checked_fields import NonNegativeInt, OneOf, PositiveFloat
 from pushplan.world.checks import FloatArray
 
 _IMAGE_CHANNELS = ("footprint", "movable", "static", "goal_distance")
@@ -69,13 +63,11 @@ class MazeVariations(TaskVariations):
     objects: Objects = "boxes"  # shapes: ``"boxes"``, or ``"many"`` of them
     # headings of the boxes at the start, ``"aligned"`` with the walls or ``"random"``
     box_yaw: Yaw = "aligned"
-    wheeled: Fraction = 0.0  # fraction of the boxes that stand on casters, 0 to 1
     # True if the robot starts anywhere instead of at the preset's start
     random_start: bool | None = None
     touching: bool | None = None  # True if boxes may start in touch with the robot
     # bumper in front of the testbed's robot, one of `pushplan.world.BUMPERS`
     bumper: Annotated[str, OneOf(BUMPERS)] | None = None
-    bumper_friction: NonNegativeFloat | None = None  # friction coefficient between robot and boxes
     time_limit: PositiveFloat | None = None  # when the episode is cut off [s]
 
 

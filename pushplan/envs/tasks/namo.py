@@ -13,7 +13,7 @@ from pushplan.envs.tasks.namo_proof import proves
 from pushplan.envs.tasks.presets import read_presets
 from pushplan.envs.tasks.variations import TaskVariations
 from pushplan.world import BUMPERS, GoalDisc, Movables, ScenarioError, World
-from pushplan.world.checked_fields import NonNegativeFloat, OneOf, PositiveFloat
+from pushplan.world.checked_fields import OneOf, PositiveFloat
 
 PRESETS = read_presets("namo")
 _TRIES = 500
@@ -33,7 +33,6 @@ class NamoVariations(TaskVariations):
     box_size: PositiveFloat | None = None  # side of a plain box [m]
     # of the testbed's robot, one of `pushplan.world.BUMPERS`
     bumper: Annotated[str, OneOf(BUMPERS)] | None = None
-    bumper_friction: NonNegativeFloat | None = None  # friction coefficient between robot and boxes
     time_limit: PositiveFloat | None = None  # when the episode is cut off [s]
 
 
@@ -115,6 +114,7 @@ class NamoTask(MazeTask):
 
     def told(self, world: World) -> World:
         """The scene with the movability of the boxes known, unknown or wrong."""
+        world = super().told(world)
         if self.variations.movability == "known":
             return world
         fixed = world.movables.fixed

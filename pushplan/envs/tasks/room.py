@@ -64,10 +64,6 @@ class RoomVariations(TaskVariations):
     time_limit: PositiveFloat | None = None
     # when it is cut off after the last object that was done [s]; never if None
     idle_limit: PositiveFloat | None = None
-    # friction coefficients between robot and objects, two objects, objects and walls
-    bumper_friction: NonNegativeFloat | None = None
-    object_friction: NonNegativeFloat | None = None
-    wall_friction: NonNegativeFloat | None = None
 
 
 class RoomTask(Task):

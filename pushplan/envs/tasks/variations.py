@@ -6,13 +6,41 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Annotated, Any, ClassVar, Self
 
-from pushplan.world import InvalidInputError, RobotModel, ScenarioError, UnknownNameError
-from pushplan.world.checked_fields import CheckedFields, OneOf, PositiveFloat
+import numpy as np
+
+from pushplan.envs.simulators.base import Materials
+from pushplan.geometry import gyration_squares
+from pushplan.world import (
+    InvalidInputError,
+    Movables,
+    RobotModel,
+    ScenarioError,
+    UnknownNameError,
+)
+from pushplan.world.checked_fields import (
+    CheckedFields,
+    Fraction,
+    Limits,
+    NonNegativeFloat,
+    OneOf,
+    PositiveFloat,
+)
 
 Yaw = Annotated[str, OneOf(("aligned", "random"))]
 """Headings of boxes at the start."""
 Objects = Annotated[str, OneOf(("boxes", "many"))]
 """Shapes of objects: square boxes, or boxes, L, T and U shapes, chairs and tables."""
+Scale = Annotated[float, Limits(1e-3, 1e3)]
+Spread = Annotated[float, Limits(1.0, 100.0)]
+"""A factor is drawn from [1 / spread, spread], uniformly in its logarithm; 1 draws none."""
+
+FRICTIONS = {
+    "bumper_friction": "robot_object",
+    "object_friction": "object_object",
+    "wall_friction": "object_static",
+    "ground_friction": "object_ground",
+}
+"""Variation -> the field of `Materials` that it replaces."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,6 +51,21 @@ class TaskVariations(CheckedFields):
     # greatest speed of the robot [m/s]; that backwards changes with it
     max_speed: PositiveFloat | None = None
     max_turn_rate: PositiveFloat | None = None  # of the robot [rad/s]
+    mass_scale: Scale = 1.0  # factor on the masses of all objects
+    mass_spread: Spread = 1.0  # of the mass of each object
+    # of the radius of the limit surface of each object, which Pymunk has
+    gyration_spread: Spread = 1.0
+    # friction coefficients between robot and objects, two objects, objects and what is static,
+    # plain objects and the ground, which MuJoCo has
+    bumper_friction: NonNegativeFloat | None = None
+    object_friction: NonNegativeFloat | None = None
+    wall_friction: NonNegativeFloat | None = None
+    ground_friction: NonNegativeFloat | None = None
+    friction_spread: Spread = 1.0  # of each of the four, one factor in a start
+    wheeled: Fraction | None = None  # fraction of the objects that stand on casters, 0 to 1
+    # claim to the policy about masses and limit surfaces: the truth, or what they would be without
+    # scale and spreads
+    parameters: Annotated[str, OneOf(("known", "unknown"))] = "known"
 
     task: ClassVar[str]
     """Name of the task."""
@@ -38,6 +81,49 @@ class TaskVariations(CheckedFields):
             min_speed=robot.min_speed * speed / robot.max_speed,
             max_turn_rate=self.max_turn_rate or robot.max_turn_rate,
         )
+
+    def change_materials(self, materials: Materials) -> Materials:
+        """The materials of a preset with the friction that is asked for."""
+        frictions = {field: getattr(self, name) for name, field in FRICTIONS.items()}
+        asked = {field: value for field, value in frictions.items() if value is not None}
+        return replace(materials, **asked)
+
+    def vary_materials(self, materials: Materials, rng: np.random.Generator) -> Materials:
+        """Draw the friction of a start."""
+        factors = self.friction_spread ** rng.uniform(-1.0, 1.0, len(FRICTIONS))
+        if self.friction_spread == 1.0:
+            return materials
+        drawn = zip(FRICTIONS.values(), factors.tolist(), strict=True)
+        return replace(
+            materials, **{field: factor * getattr(materials, field) for field, factor in drawn}
+        )
+
+    def vary_objects(
+        self, objects: Movables, rng: np.random.Generator
+    ) -> tuple[Movables, Movables]:
+        """Draw masses, limit surfaces and casters of the objects of a start.
+
+        Every draw is made, asked for or not, so that none changes another.
+
+        Returns:
+            The objects on casters with their masses and limit surfaces as before, and as drawn.
+        """
+        count = len(objects)
+        logs = rng.uniform(-1.0, 1.0, (count, 2))
+        order = rng.permutation(count)
+        if self.wheeled is not None:
+            on_casters = round(self.wheeled * count)
+            # boxes that were placed on casters stay there
+            if on_casters != objects.wheeled.sum():
+                objects = replace(objects, wheeled=np.isin(np.arange(count), order[:on_casters]))
+        nominal = objects
+        if self.mass_scale != 1.0 or self.mass_spread > 1.0:
+            factors = self.mass_scale * self.mass_spread ** logs[:, 0]
+            objects = replace(objects, masses=objects.masses * factors)
+        if self.gyration_spread > 1.0:
+            radii = np.sqrt(gyration_squares(objects)) * self.gyration_spread ** logs[:, 1]
+            objects = replace(objects, gyration_radii=radii)
+        return nominal, objects
 
     @classmethod
     def read(cls, values: Mapping[str, Any]) -> Self:
