@@ -20,7 +20,8 @@ from pushplan.world import Drive, GoalDisc, Movables, PlanStatus, RobotModel, St
 # for tests of benchmarks; at the end, so that an installed pushplan comes before the checkout
 sys.path.append(str(Path(__file__).parents[1]))
 
-hypothesis.settings.register_profile("busy", deadline=None)  # a shared machine has no speed
+# a shared machine has no speed
+hypothesis.settings.register_profile("busy", deadline=None, max_examples=40)
 hypothesis.settings.load_profile("busy")
 
 LEARN = ("torch", "stable_baselines3", "onnx", "minari", "h5py", "tensorboard")

@@ -169,7 +169,7 @@ def test_processes_that_start_each_other_end_with_the_batch(
 
 
 def test_a_score_outside_its_range_is_refused(tmp_path: Path) -> None:
-    row = run(tmp_path, "Boasts")["Boasts"]
+    row = run(tmp_path, "Boasts", workers=0)["Boasts"]
     assert row.status == "policy_error" and "E_nav" in row.reason and row.E_nav == 0.0
 
 
@@ -214,7 +214,7 @@ def test_a_worker_that_was_killed_from_outside_gets_another_try(
 
 
 def test_addresses_are_not_in_stored_episodes(tmp_path: Path) -> None:
-    run(tmp_path, "Raises")
+    run(tmp_path, "Raises", workers=0)
     with np.load(next((tmp_path / "episodes").iterdir())) as data:
         header = json.loads(str(data["header"]))
     assert "0x..." in header["reason"]

@@ -46,7 +46,7 @@ def test_what_is_made_of_a_large_map_is_made_in_pieces():
 
 @pytest.mark.parametrize("name", PLANNERS)
 def test_a_call_ends_at_the_look_that_fires(name):
-    for last in (1, 2, 4, 7, 9):
+    for last in (1, 4, 9):
         looks = Looks(last)
         result = make_planner(name).plan(posts(3000, seed=100 + last), stop=looks)
         assert result.status is PlanStatus.TIMED_OUT

@@ -156,7 +156,7 @@ def test_rollouts_end_in_the_goal_and_at_walls():
     assert 5.5 < rollouts.paths[0, rollouts.ends[0], 1] < 6.0
 
 
-@pytest.mark.parametrize("name", ["mppi", "cem"])
+@pytest.mark.parametrize("name", ["mppi", pytest.param("cem", marks=pytest.mark.slow)])
 def test_it_reaches_the_goal_and_the_same_seed_gives_the_same_commands(name):
     runs = []
     for _ in range(2):

@@ -58,8 +58,14 @@ def run(policy, *, task, preset, seed, limit=1500, disturb=None, **options):
 
 EPISODES = [
     ("area_clearing", "benchmark", "pymunk", {"layout": "clear_small", "boxes": 3}),
-    ("area_clearing", "testbed", "mujoco", {"layout": "clear_small", "boxes": 2}),
-    ("box_delivery", "benchmark", "pymunk", {"layout": "small_empty", "boxes": 2}),
+    pytest.param(
+        *("area_clearing", "testbed", "mujoco", {"layout": "clear_small", "boxes": 2}),
+        marks=pytest.mark.slow,
+    ),
+    pytest.param(
+        *("box_delivery", "benchmark", "pymunk", {"layout": "small_empty", "boxes": 2}),
+        marks=pytest.mark.slow,
+    ),
     ("box_delivery", "testbed", "mujoco", {"layout": "small_empty", "boxes": 2}),
 ]
 
