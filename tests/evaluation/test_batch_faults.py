@@ -169,7 +169,7 @@ def test_processes_that_start_each_other_end_with_the_batch(
 
 
 def test_a_score_outside_its_range_is_refused(tmp_path: Path) -> None:
-    row = run(tmp_path, "Boasts", workers=0)["Boasts"]
+    row = run(tmp_path, "Boasts")["Boasts"]
     assert row.status == "policy_error" and "E_nav" in row.reason and row.E_nav == 0.0
 
 

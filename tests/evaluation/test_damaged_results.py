@@ -62,7 +62,7 @@ def test_a_damaged_database_is_one_line_and_results_are_saved(
 def test_wrong_values_are_one_line(run: Path) -> None:
     for change in ("E_nav = 7.0", "status = 'fine'", "reason = x'ff'", "began = 'today'"):
         with sqlite3.connect(run / "results.db") as db:
-            db.execute(f"UPDATE results SET {change} WHERE seed = 3")
+            db.execute(f"UPDATE results SET {change} WHERE seed = 1")
         with pytest.raises(DamagedResultsError, match="pushplan runs salvage"):
             Results.load(run)
     done = salvage(run, run.parent / "saved")

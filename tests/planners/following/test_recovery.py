@@ -278,7 +278,7 @@ def test_a_robot_without_a_plan_does_not_run_away():
     for pose, backwards in (((1.3, 5.0, 0.0), False), ((11.25, 3.75, 0.5 * np.pi), True)):
         robot = Unicycle(make_u_maze(robot=make_robot(**REVERSING), robot_pose=pose), 0.2)
         policy, first = policy_for(NoPlan()), None
-        while robot.world.time < 200.0:
+        while robot.world.time < 400.0:
             twist = policy.act(robot.world)
             first = first or (twist if twist != Twist(0.0, 0.0) else None)
             robot.drive(twist)
