@@ -80,6 +80,7 @@ def test_namo_looks_while_it_makes_its_grid():
         assert looks.count <= last + 8
 
 
+@pytest.mark.slow
 def test_thousands_of_obstacles_grow_together_as_each_would_alone():
     world = replace(posts(3000, seed=5), margin=0.03)
     others = [replace(world, margin=0.01 * k) for k in (4, 5, 6)]  # none of them is kept

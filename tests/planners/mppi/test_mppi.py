@@ -196,6 +196,7 @@ def test_decisions_that_take_time_are_driven_from_where_they_are_due():
     assert policy.plan_log
 
 
+@pytest.mark.slow
 def test_a_box_is_pushed_out_of_an_area():
     area = ClearanceArea(6.0 * SQUARE + 5.0, np.ones(4, np.bool_))
     world = replace(room(Drive.DIFFERENTIAL, walls=False, goal=area), robot=box_delivery_robot())
