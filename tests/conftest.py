@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import os
 import sys
@@ -20,7 +21,8 @@ from pushplan.world import Drive, GoalDisc, Movables, PlanStatus, RobotModel, St
 # for tests of benchmarks; at the end, so that an installed pushplan comes before the checkout
 sys.path.append(str(Path(__file__).parents[1]))
 
-hypothesis.settings.register_profile("busy", deadline=None)  # a shared machine has no speed
+# a shared machine has no speed
+hypothesis.settings.register_profile("busy", deadline=None, max_examples=40)
 hypothesis.settings.load_profile("busy")
 
 LEARN = ("torch", "stable_baselines3", "onnx", "minari", "h5py", "tensorboard")
@@ -109,6 +111,28 @@ def pytest_configure(config: pytest.Config) -> None:
         os.environ["PYTHONSAFEPATH"] = "1"  # else a checkout that one works in counts
         first = [str(Path(pushplan.__file__).parents[1]), os.environ.get("PYTHONPATH", "")]
         os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, first))
+        if getattr(config.option, "numprocesses", None) and not sys.dont_write_bytecode:
+            rewrite_asserts(config)
+
+
+def rewrite_asserts(config: pytest.Config) -> None:
+    """Let pytest rewrite the asserts of test files once, before each worker does so for itself.
+
+    That takes most of the time of a first collection. It calls what pytest does not promise to
+    keep: where that has changed, the workers do it as ever.
+    """
+    named = [Path(one.partition("::")[0]) for one in config.args]
+    files = [file for one in named for file in ([one] if one.is_file() else one.rglob("test_*.py"))]
+    with contextlib.suppress(ImportError, AttributeError, TypeError, ValueError, OSError):
+        from _pytest.assertion import rewrite
+
+        state = config.stash[rewrite.assertstate_key]
+        for file in map(Path.absolute, files):
+            folder = rewrite.get_cache_dir(file)
+            cached = folder / f"{file.stem}{rewrite.PYC_TAIL}"
+            if rewrite._read_pyc(file, cached) is None and rewrite.try_makedirs(folder):
+                version, code = rewrite._rewrite_test(file, config)
+                rewrite._write_pyc(state, code, version, cached)
 
 
 def pytest_collection_finish() -> None:

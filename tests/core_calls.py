@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import faulthandler
+import functools
 import importlib
 import json
 import os
@@ -380,6 +381,7 @@ def split(text: str) -> Iterator[str]:
         yield part.strip()
 
 
+@functools.cache
 def parameter(name: str, text: str) -> Parameter:
     text = text.split(" = ")[0]
     if array := re.match(r"ndarray\[dtype=(\w+), shape=\(([^)]*)\)", text):
@@ -392,8 +394,13 @@ def parameter(name: str, text: str) -> Parameter:
     return Parameter(name, text.removeprefix("pushplan._core."))
 
 
-def signatures_of(room: ModuleType) -> Iterator[Signature]:
-    """Yield every way to call what a room binds."""
+@functools.cache
+def signatures_of(room: ModuleType) -> tuple[Signature, ...]:
+    """Every way to call what a room binds."""
+    return tuple(_read_signatures(room))
+
+
+def _read_signatures(room: ModuleType) -> Iterator[Signature]:
     short = room.__name__.rsplit(".", 1)[1]
     for name, bound in vars(room).items():
         methods = vars(bound).items() if isinstance(bound, type) else [("", bound)]
@@ -478,7 +485,7 @@ class Caller:
         PREPARED.get(name, lambda _: None)(made)
         return made
 
-    def all_of(self, room: str) -> Iterator[Signature]:
+    def all_of(self, room: str) -> tuple[Signature, ...]:
         return signatures_of(self.rooms[room])
 
     def arguments(self, signature: Signature) -> list[Any]:

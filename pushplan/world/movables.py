@@ -228,7 +228,7 @@ class Movables(ArrayRecord, CheckedFields):
         shapes = shapes_of("polygon", polygons)
         centres = areas_and_centres([disjoint(parts) for parts in shapes])[1]
         poses = np.column_stack([centres, np.zeros(len(shapes))])
-        outlines = [
+        outlines = [  # tuples: of one part each they are checked all at once
             tuple(part - centre for part in parts)
             for parts, centre in zip(shapes, centres, strict=True)
         ]

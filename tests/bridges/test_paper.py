@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -74,10 +73,15 @@ def test_ours_beside_theirs(
     assert "1.066" in straight[4]
 
 
-def test_a_run_without_the_papers_suites_is_refused(tmp_path: Path, paper: ModuleType) -> None:
-    command = [sys.executable, str(SCRIPT), str(tmp_path)]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
-    assert done.returncode == 2 and done.stderr.count("\n") == 1
+def test_a_run_without_the_papers_suites_is_refused(
+    tmp_path: Path,
+    paper: ModuleType,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["paper.py", str(tmp_path)])
+    assert paper.main() == 2
+    assert capsys.readouterr().err.count("\n") == 1
     with pytest.raises(InvalidInputError, match="no suite of the paper"):
         paper.beside(bench("maze-2d-6", ["straight"], episodes=1, workers=0))
 

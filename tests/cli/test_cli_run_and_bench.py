@@ -107,6 +107,7 @@ def test_bench_with_a_file_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFix
     assert main(["report", str(out), "--metrics", "E_nav_to_goal_point"]) == 0
 
 
+@pytest.mark.slow
 def test_the_same_from_python() -> None:
     results = bench("maze-2d-5", policies=["straight", "random"], episodes=2, workers=0)
     assert "straight" in results.table()

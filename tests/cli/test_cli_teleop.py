@@ -141,7 +141,7 @@ def play(
 
 def test_an_episode_is_recorded_as_driven(tmp_path: Path) -> None:
     # it begins with the first key; the ship-like robot goes on by itself, then turns left
-    episode, _ = play((1.0, "Up"), (1.1, "-Up"), (3.5, "Left"), (5.7, "Escape"), boxes=3)
+    episode, _ = play((0.2, "Up"), (0.3, "-Up"), (1.5, "Left"), (3.5, "Escape"), boxes=3)
     assert (episode.success, episode.reason) == (False, "stopped")
     turning = (episode.actions[:, 0] > 0.9).tolist()
     assert turning == sorted(turning) and 0 < sum(turning) < len(turning)
@@ -154,11 +154,11 @@ def test_an_episode_is_recorded_as_driven(tmp_path: Path) -> None:
     assert heading[-1] > heading[0] + 0.05
 
 
-@pytest.mark.parametrize("speed", [0.5, 4.0])
+@pytest.mark.parametrize("speed", [0.5, 8.0])
 def test_simulated_time_keeps_pace_with_the_clock(speed: float) -> None:
-    episode, script = play((0.0, "Up"), (4.0, "q"), speed=speed, boxes=0)
+    episode, script = play((0.0, "Up"), (2.0, "q"), speed=speed, boxes=0)
     simulated = episode.times[-1] - episode.times[0]
-    assert simulated == pytest.approx(4.0 * speed, abs=0.8 + 0.1)
+    assert simulated == pytest.approx(2.0 * speed, abs=0.8 + 0.1)
     gaps = np.diff([when for when, _ in script.frames[1:]])
     assert 0.03 < gaps.min() and gaps.max() < 0.2  # smooth, and no more than eyes need
 
@@ -178,14 +178,14 @@ def test_a_slow_machine_does_not_race_afterwards() -> None:
 
 
 def test_starting_again_drops_what_was_driven() -> None:
-    fresh, _ = play((0.0, "Up"), (2.0, "q"), boxes=4)
-    again, _ = play((0.0, "Left"), (2.9, "-Left"), (3.0, "r"), (5.0, "Up"), (7.0, "q"), boxes=4)
+    fresh, _ = play((0.0, "Up"), (1.0, "q"), boxes=2)
+    again, _ = play((0.0, "Left"), (0.9, "-Left"), (1.0, "r"), (1.5, "Up"), (2.5, "q"), boxes=2)
     assert again.world == fresh.world
     assert (again.actions == 0.0).all()
     assert abs(len(again.actions) - len(fresh.actions)) <= 1
 
 
-@pytest.mark.parametrize("when", [0.5, 6.0])
+@pytest.mark.parametrize("when", [0.5, 3.0])
 def test_closing_the_window_keeps_the_episode(when: float) -> None:
     episode, _ = play((1.0, "Up"), (when, "close"), boxes=2)
     assert episode.reason == "stopped"
@@ -201,7 +201,9 @@ def test_an_episode_that_ends_by_itself_shows_its_scores_and_waits() -> None:
     assert play(*events, speed=20.0, boxes=0)[0].reason == "stopped"
 
 
-@pytest.mark.parametrize("task", ["area_clearing", "box_delivery"])
+@pytest.mark.parametrize(
+    "task", ["area_clearing", pytest.param("box_delivery", marks=pytest.mark.slow)]
+)
 def test_manipulation_tasks_can_be_driven(task: str) -> None:
     episode, script = play((0.0, "w"), (1.5, "d"), (2.5, "q"), task=task)
     assert episode.completed is not None and len(episode.completed) == 10

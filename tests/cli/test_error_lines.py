@@ -99,20 +99,20 @@ def test_bench_says_why_policies_failed_and_why_episodes_did_not_succeed(
 ) -> None:
     names = ("Good", "Raises", "Nothing", "NotANumber", "Straight")
     given = ",".join(f"{mine}:{name}" for name in names)
-    options = ["--episodes", "2", "--workers", "0", "--out", "run"]
+    options = ["--episodes", "1", "--workers", "0", "--out", "run"]
     assert main(["bench", "maze-2d-3", "--policies", given, *options]) == 1
     said = capsys.readouterr()
     lines = [line for line in said.err.splitlines() if "failed" in line]
     told, files = zip(*(line.split("; traceback: ") for line in lines), strict=True)
     assert told == (
-        "Raises: 2 of 2 failed: KeyError: 'oops' (mine.py:17)",
-        "Nothing: 2 of 2 failed: InvalidInputError: what the planner returns must be a PlanResult, "
+        "Raises: 1 of 1 failed: KeyError: 'oops' (mine.py:17)",
+        "Nothing: 1 of 1 failed: InvalidInputError: what the planner returns must be a PlanResult, "
         "got None",
-        "NotANumber: 2 of 2 failed: InvalidInputError: plan.poses must be finite, got nan at index "
+        "NotANumber: 1 of 1 failed: InvalidInputError: plan.poses must be finite, got nan at index "
         "(0, 0) (mine.py:38)",
     )
     assert all("Traceback" in Path(file).read_text() for file in files)
-    assert "Straight without success: 2 wall" in said.out.splitlines()
+    assert "Straight without success: 1 wall" in said.out.splitlines()
     assert "Good without success" not in said.out
 
 

@@ -49,7 +49,7 @@ def test_it_stays_on_a_curved_plan(period):
     assert max(abs(c.angular) for c in commands) <= world.robot.max_turn_rate + 1e-12
 
 
-@settings(max_examples=25)
+@settings(max_examples=10)
 @given(st.floats(-1.5, 1.5), st.floats(-1.4, 1.4))
 def test_it_comes_back_to_the_plan(offset, turn):
     world = start()

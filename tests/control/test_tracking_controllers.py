@@ -80,7 +80,7 @@ def test_the_follower_stays_on_a_curved_plan():
     assert np.hypot(*(poses[-1] - plan.poses[-1])[:2]) < 0.2
 
 
-@settings(max_examples=40)
+@settings(max_examples=12)
 @given(st.floats(-0.6, 0.6), st.floats(-0.5, 0.5))
 def test_the_follower_comes_back_to_the_plan(offset, turn):
     start = make_u_maze(static=FLOOR, robot_pose=[0, 0, 0])

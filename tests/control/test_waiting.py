@@ -62,7 +62,7 @@ def test_a_robot_waits_for_any_time_among_posts() -> None:
     """Wherever a circle fits at the start, the robot touches nothing in a minute of waiting."""
     rng = np.random.default_rng(11)
     waited = 0
-    for _ in range(40):
+    for _ in range(16):
         posts = [tuple(post) for post in rng.uniform(0.5, 9.5, (6, 2))]
         world = room((*rng.uniform(2.0, 8.0, 2), rng.uniform(-3.0, 3.0)), *posts)
         walls = unary_union([Polygon(part) for part in world.static.convex_parts])
@@ -77,4 +77,4 @@ def test_a_robot_waits_for_any_time_among_posts() -> None:
             x, y, theta = (float(value) for value in world.robot_pose)
             body = affinity.translate(affinity.rotate(Polygon(SQUARE), theta, (0, 0), True), x, y)
             assert body.intersection(walls).area < 1e-6
-    assert waited >= 8
+    assert waited >= 3

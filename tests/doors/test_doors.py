@@ -33,7 +33,7 @@ FILES = [name for name in DOORS if name not in ("policy-name", "variation")]
 @pytest.mark.filterwarnings("ignore")  # of NumPy, of strange headers and values
 @pytest.mark.parametrize("name", DOORS)
 def test_mutations_give_a_value_or_one_line(name: str, tmp_path: Path) -> None:
-    cost = feed(name, 6 if name == "experiment" else 60, tmp_path)
+    cost = feed(name, 6 if name == "experiment" else 30, tmp_path)
     assert cost.worst < 2.0 and cost.grown < 500.0
 
 
@@ -47,7 +47,7 @@ def test_any_value_of_any_key_may_be_wrong(name: str, tmp_path: Path) -> None:
     path, good = DOORS[name].make(tmp_path)
     write = json.dumps if path.suffix == ".json" else dump
     data = list(swapped(parse_yaml(good.decode())))
-    picked = np.random.default_rng(1).permutation(len(data))[:100]
+    picked = np.random.default_rng(1).permutation(len(data))[:50]
     for changed in (data[k] for k in picked.tolist()):
         path.write_text(write(changed))
         try:
@@ -136,7 +136,7 @@ YAMLS = {
     "long": ("time: " + "9" * 5000, "400 digits"),
     "hexadecimal": ("time: 0x" + "f" * 5000, "400 digits"),
     "exponent": ("time: 1e" + "1" * 5000, "400 digits"),
-    "many": ("[" + "1," * 1_000_000 + "1]", "60,000 values"),
+    "many": ("[" + "1," * 100_000 + "1]", "60,000 values"),
     "escapes": ('"\\e[2J\\e[31m": 1', r"\x1b[2J"),
     "tag": ("!!bool maybe", "not valid YAML"),
     "object": ("!!python/object/apply:os.getcwd []", "not valid YAML"),

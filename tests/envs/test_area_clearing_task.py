@@ -18,7 +18,7 @@ def task(preset="benchmark", action="velocity", **variations):
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("preset", BY_DEFAULT)
-@pytest.mark.parametrize("seeds", [50, pytest.param(200, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seeds", [25, pytest.param(200, marks=pytest.mark.slow)])
 def test_starts_are_valid(preset, layout, seeds):
     clearing = task(preset, layout=layout, random_start=True)
     area = shapely.Polygon(clearing.goal.polygon)
@@ -35,7 +35,7 @@ def test_starts_are_valid(preset, layout, seeds):
         if seed % 40 == 0 and preset == "benchmark":
             check_reach(world, 2.0 * clearing.preset.field_resolution)
     span = np.ptp(clearing.goal.polygon[:, 0]) - 2.0 * clearing.preset.start_margin
-    assert 0.9 * span < np.ptp(xs) <= span
+    assert (0.8 if seeds < 200 else 0.9) * span < np.ptp(xs) <= span
 
 
 def test_dimensions_of_the_layouts():

@@ -74,6 +74,7 @@ def pairwise(rows):
 ALL = list(combinations())
 SOME = pairwise(ALL)
 WORLDS = ["-".join(names) for names in worlds()]
+FEW = suite_names()[::3]
 PAIRS = list(dict.fromkeys(tuple(name.split("-")[:2]) for name in WORLDS))
 
 
@@ -83,7 +84,7 @@ def make(name, **options):
     return PushEnv(task=task, simulator=simulator, preset=preset, **options)
 
 
-def drive(env, seed, steps=6):
+def drive(env, seed, steps=4):
     """Everything that an episode shows."""
     observation, info = env.reset(seed=seed)
     shown = [observation.tobytes(), comparable(info), env.world]
@@ -183,9 +184,17 @@ def test_infos_and_traces_say_what_happened(name):
 
 
 @pytest.mark.parametrize(
-    ("task", "variations"), [(task, one) for task, some in LAYOUTS.items() for one in some]
+    ("task", "variations", "simulator"),
+    [
+        pytest.param(task, one, simulator, marks=pytest.mark.slow if k % 2 else ())
+        for k, (task, one, simulator) in enumerate(
+            (task, one, simulator)
+            for task, some in LAYOUTS.items()
+            for n, one in enumerate(some)
+            for simulator in sorted(SIMULATORS, reverse=n % 2 == 1)
+        )
+    ],
 )
-@pytest.mark.parametrize("simulator", SIMULATORS)
 def test_every_variation_starts_and_steps(task, variations, simulator):
     env = PushEnv(task=task, simulator=simulator, variations=variations, observation="image")
     observation, _ = env.reset(seed=0)
@@ -195,7 +204,10 @@ def test_every_variation_starts_and_steps(task, variations, simulator):
     assert np.isfinite(reward)
 
 
-@pytest.mark.parametrize("name", suite_names())
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=() if name in FEW else pytest.mark.slow) for name in suite_names()],
+)
 def test_every_suite_starts(name):
     first = suite(name, episodes=1).scenarios[0]
     env = make_scenario(first, observation="state")
@@ -296,7 +308,7 @@ def test_there_is_an_action_mode_for_every_name_that_a_task_gives():
 @pytest.mark.parametrize(("task", "simulator", "preset"), list(worlds()))
 def test_a_seed_is_the_same_start_for_every_action(task, simulator, preset):
     kind = look_up("task", TASKS, task)
-    for seed in (5, 14028):
+    for seed in (14028,):
         starts = []
         for action in kind.actions:
             env = PushEnv(

@@ -246,7 +246,7 @@ def test_a_ship_loses_what_a_floe_gains():
     assert not simulator.held
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", range(1))
 def test_no_body_is_ever_inside_a_wall(seed):
     world = cluttered(seed, wheeled=(0, 3))
     simulator = built(world)

@@ -44,6 +44,7 @@ def test_the_shell_changes_no_bit_of_a_trajectory(monkeypatch, robot, ground):
     assert len(set(bare)) == len(bare)  # it does drive
 
 
+@pytest.mark.slow
 def test_the_house_of_a_ship_changes_no_bit_of_a_trajectory(monkeypatch):
     def driven_ship() -> bytes:
         mujoco_model.scene_model.cache_clear()

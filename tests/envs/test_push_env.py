@@ -51,6 +51,7 @@ def rollout(env, seed, steps=15):
         ("state", "velocity", "testbed", "u"),
     ],
 )
+@pytest.mark.slow
 def test_check_env_passes_without_a_warning(observation, action, preset, shape):
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -164,6 +164,7 @@ def test_driving_freely_up_to_the_first_contact_changes_nothing(seed, holds):
     assert np.abs(some.object_poses - poses).max() > 0.3
 
 
+@settings(max_examples=25)
 @given(
     turn=st.floats(-0.3, 0.3),
     speed=st.floats(-0.3, 0.3),

@@ -214,7 +214,7 @@ def test_a_worker_that_was_killed_from_outside_gets_another_try(
 
 
 def test_addresses_are_not_in_stored_episodes(tmp_path: Path) -> None:
-    run(tmp_path, "Raises")
+    run(tmp_path, "Raises", workers=0)
     with np.load(next((tmp_path / "episodes").iterdir())) as data:
         header = json.loads(str(data["header"]))
     assert "0x..." in header["reason"]

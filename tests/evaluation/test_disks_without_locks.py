@@ -27,8 +27,14 @@ def without_locks(monkeypatch: pytest.MonkeyPatch, code: int, *names: str) -> No
         monkeypatch.setattr(fcntl, name, refuse)
 
 
-@pytest.mark.parametrize("code", [errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP])
-@pytest.mark.parametrize("names", [("flock",), ("flock", "lockf")], ids=["flock", "both"])
+@pytest.mark.parametrize(
+    ("code", "names"),
+    [
+        (errno.ENOLCK, ("flock",)),
+        (errno.EOPNOTSUPP, ("flock", "lockf")),
+        pytest.param(errno.ENOSYS, ("flock", "lockf"), marks=pytest.mark.slow),
+    ],
+)
 def test_a_batch_runs_with_one_warning_and_goes_on(
     code: int,
     names: tuple[str, ...],

@@ -176,7 +176,10 @@ def test_only_what_was_asked_for_is_left_out() -> None:
 
 
 @pytest.mark.usefixtures("empty_figures")
-@pytest.mark.parametrize(("traces", "kept"), [("all", 2), ("failures", 1), ("none", 0)])
+@pytest.mark.parametrize(
+    ("traces", "kept"),
+    [pytest.param("all", 2, marks=pytest.mark.slow), ("failures", 1), ("none", 0)],
+)
 def test_only_wanted_episodes_are_kept(tmp_path: Path, traces: str, kept: int) -> None:
     data = {
         "schema": "pushplan-experiment/1",

@@ -60,7 +60,10 @@ def shown_texts(figure: Any, renderer: Any) -> list[tuple[str, Any]]:
     return [(text, box) for text, box in boxes if box.width > 0.0]
 
 
-@pytest.mark.parametrize("width", [None, 3.3, pytest.param(7.0, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "width",
+    [3.3, *(pytest.param(width, marks=pytest.mark.slow) for width in (None, 7.0))],
+)
 @pytest.mark.parametrize("name", FIGURES)
 @pytest.mark.parametrize(
     ("policies", "settings", "long"),

@@ -206,6 +206,7 @@ class TestRunEpisode:
         # of the three ticks of a call one is the planning's own
         assert np.diff(policy.times) == pytest.approx(0.8 + 2.0 * 2.0)
 
+    @pytest.mark.slow
     def test_slow_planning_costs_a_plan_follower_little(self):
         """It drives the old plan until the new one is there; one that waits for it does not."""
         frozen = run_episode(maze(), make_policy("kinodynamic-rrt"), MAZE)
@@ -253,6 +254,7 @@ class TestBatch:
         assert goes_on.job != still.job
         assert "latency-aware x 1" in Results.load(tmp_path).table()
 
+    @pytest.mark.slow
     def test_the_columns_are_the_same(self, tmp_path):
         for name, factor in (("frozen", None), ("honest", 1.0)):
             bench([MAZE], [straight], workers=0, out=tmp_path / name, latency_factor=factor)

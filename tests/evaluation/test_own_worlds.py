@@ -35,6 +35,7 @@ def keys(given: Experiment) -> list[str]:
     return [job.scenario.key for job in given.jobs]
 
 
+@pytest.mark.usefixtures("empty_figures")
 def test_a_folder_of_worlds_is_one_setting_whose_scenarios_are_its_files(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

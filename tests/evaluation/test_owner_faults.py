@@ -153,7 +153,10 @@ def test_a_library_that_an_environment_lacks(
     assert not Results.load(tmp_path).rows
 
 
-@pytest.mark.parametrize("how", ["removed", "replaced", "moved with its folder"])
+@pytest.mark.parametrize(
+    "how",
+    ["removed", pytest.param("replaced", marks=pytest.mark.slow), "moved with its folder"],
+)
 def test_results_that_are_taken_away(tmp_path: Path, how: str) -> None:
     out, file = tmp_path / "run", tmp_path / "run" / "results.db"
 

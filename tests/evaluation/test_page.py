@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conftest import leave_figures_empty
 from synthetic_rows import many_rows
 
 from pushplan.cli import main
@@ -28,7 +29,10 @@ LINES = "#matrix tbody tr:not(.space)"
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("page") / "run"
-    bench("maze-2d-3", POLICIES, episodes=3, workers=0, out=out).report()
+    results = bench("maze-2d-3", POLICIES, episodes=3, workers=0, out=out)
+    with pytest.MonkeyPatch.context() as patch:
+        leave_figures_empty(patch)
+        results.report()
     return out
 
 
@@ -86,6 +90,7 @@ def test_filters_and_sorting(opened: Opened) -> None:
     assert [float(text.split()[0]) for text in opened.cells(3)] == sorted(values)
 
 
+@pytest.mark.slow
 def test_a_table_sorts_by_its_numbers(opened: Opened) -> None:
     table = opened.page.locator("#scores table").first
     table.locator("th button", has_text="I_nav").click()
@@ -138,6 +143,7 @@ def test_an_episode_is_played_beside_another_in_step(opened: Opened, folder: Pat
     assert opened.state("player.playing") is False
 
 
+@pytest.mark.slow
 def test_keys_move_in_the_matrix_and_choose(opened: Opened) -> None:
     assert opened.state("[state.line, state.column]") == [0, 1]  # who has no success comes first
     opened.page.locator("#matrix").focus()
@@ -152,7 +158,10 @@ def test_keys_move_in_the_matrix_and_choose(opened: Opened) -> None:
     assert opened.state(ground) != light
 
 
-@pytest.mark.parametrize(("width", "scheme"), [(390, "dark"), (1280, "light")])
+@pytest.mark.parametrize(
+    ("width", "scheme"),
+    [(390, "dark"), pytest.param(1280, "light", marks=pytest.mark.slow)],
+)
 def test_nothing_is_cut_off(browser: Any, folder: Path, width: int, scheme: str) -> None:
     one = Opened(
         browser,
@@ -165,6 +174,7 @@ def test_nothing_is_cut_off(browser: Any, folder: Path, width: int, scheme: str)
 
 
 @pytest.mark.usefixtures("empty_figures")
+@pytest.mark.slow
 def test_printed_tables_keep_their_columns(browser: Any, tmp_path: Path) -> None:
     results = many_rows(24, 3)
     long = [replace(row, policy=f"{'a_very_long_name@' * 3}{row.policy}") for row in results.rows]

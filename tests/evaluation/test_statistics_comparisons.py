@@ -75,7 +75,7 @@ def is_the_same_the_other_way_round(values: list[float]) -> None:
     assert signed_rank_test(-gaps) == pytest.approx((p_value, -effect))
 
 
-@pytest.mark.parametrize("shift", [0.3, 0.6])
+@pytest.mark.parametrize("shift", [0.3, pytest.param(0.6, marks=pytest.mark.slow)])
 def test_with_the_pairs_that_are_needed_the_test_rejects_in_eight_of_ten(shift: float) -> None:
     rng = np.random.default_rng(1)
     pilot = rng.normal(size=20_000)

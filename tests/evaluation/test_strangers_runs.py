@@ -354,6 +354,7 @@ def test_files_behind_links_are_not_taken_along(run: Path, tmp_path: Path) -> No
     assert notes and not any((tmp_path / "merged" / "failures").iterdir())
 
 
+@pytest.mark.usefixtures("empty_figures")
 def test_a_page_shows_texts_as_they_are(run: Path) -> None:
     text = "</script><script>alert(1)</script><img src=x>"
     with sqlite3.connect(run / "results.db") as db:

@@ -77,7 +77,7 @@ def test_transform_points_may_work_in_place() -> None:
 
 
 @given(convex_polygons(reach=1.0), convex_polygons(reach=1.0))
-@settings(max_examples=400)
+@settings(max_examples=150)
 def test_overlap_distance_and_penetration_equal_shapely(a: np.ndarray, b: np.ndarray) -> None:
     pa, pb = shapely.Polygon(a), shapely.Polygon(b)
     depth, nx, ny = convex_penetration(a, b)
@@ -89,7 +89,7 @@ def test_overlap_distance_and_penetration_equal_shapely(a: np.ndarray, b: np.nda
 
 
 @given(convex_polygons(reach=0.2), convex_polygons(reach=0.2))
-@settings(max_examples=300, suppress_health_check=[HealthCheck.filter_too_much])
+@settings(max_examples=100, suppress_health_check=[HealthCheck.filter_too_much])
 def test_moving_by_the_penetration_separates_and_less_does_not(
     a: np.ndarray, b: np.ndarray
 ) -> None:

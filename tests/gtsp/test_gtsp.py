@@ -98,10 +98,10 @@ def close(a: float, b: float, costs: np.ndarray) -> bool:
     return a == b or abs(a - b) <= 1e-12 * len(costs) * (finite.max() if finite.size else 1.0)
 
 
-def test_exact_is_brute_force_on_a_thousand_instances() -> None:
+def test_exact_is_brute_force_on_hundreds_of_instances() -> None:
     rng = np.random.default_rng(1)
     found = {status: 0 for status in TourStatus}
-    for _ in range(1000):
+    for _ in range(300):
         costs, clusters = random_instance(rng)
         if math.prod(map(len, clusters)) * math.factorial(len(clusters) - 1) > 2500:
             continue
@@ -112,8 +112,8 @@ def test_exact_is_brute_force_on_a_thousand_instances() -> None:
         assert tour.lower_bound == tour.cost
         check_tour(tour, costs, clusters)
         found[tour.status] += 1
-    assert found[TourStatus.OPTIMAL] > 250
-    assert found[TourStatus.INFEASIBLE] > 50
+    assert found[TourStatus.OPTIMAL] > 75
+    assert found[TourStatus.INFEASIBLE] > 15
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -151,7 +151,7 @@ def test_proof_is_brute_force_whatever_the_costs() -> None:
     """Bounds never above the optimum; negative costs, ties, and 1e9 for a forbidden arc."""
     rng = np.random.default_rng(11)
     proven = 0
-    for _ in range(150):
+    for _ in range(60):
         sizes = rng.integers(1, 4, rng.integers(4, 7))
         count = int(sizes.sum())
         low = rng.choice([-5.0, 0.0])
@@ -172,7 +172,7 @@ def test_proof_is_brute_force_whatever_the_costs() -> None:
             proven += 1
         elif tour.status is TourStatus.INFEASIBLE:
             assert best == math.inf
-    assert proven >= 60
+    assert proven >= 24
 
 
 def test_a_large_number_for_a_forbidden_arc_does_not_blur_the_proof() -> None:
@@ -336,11 +336,13 @@ def test_iterations_are_counted_and_other_seeds_differ() -> None:
 
 
 @pytest.mark.usefixtures("cpu_time")
-@pytest.mark.parametrize("config", [GtspConfig(), SEARCH, PROOF])
+@pytest.mark.parametrize(
+    "config", [GtspConfig(), pytest.param(SEARCH, marks=pytest.mark.slow), PROOF]
+)
 def test_deadline_holds(config: GtspConfig) -> None:
     costs, clusters = pushes(16, 16, 0)
     over, found = [], 0
-    for seconds in (0.02, 0.1, 0.25, 0.5):
+    for seconds in (0.02, 0.1, 0.25):
         began = time.perf_counter()
         tour = solve_gtsp(costs, clusters, stop=Deadline(seconds), config=config)
         over.append(time.perf_counter() - began - seconds)
@@ -380,11 +382,12 @@ def test_a_cluster_that_cannot_be_left_is_infeasible_however_large() -> None:
     assert tour.lower_bound == math.inf
 
 
+@pytest.mark.slow
 def test_large_instances_keep_promising_nodes() -> None:
     costs, clusters = pushes(60, 30, 0)
     few = GtspConfig(search_nodes=400)
-    tour = solve_gtsp(costs.astype(np.float32), clusters, stop=MaxIterations(300), config=few)
-    full = solve_gtsp(costs, clusters, stop=MaxIterations(300))
+    tour = solve_gtsp(costs.astype(np.float32), clusters, stop=MaxIterations(150), config=few)
+    full = solve_gtsp(costs, clusters, stop=MaxIterations(150))
     check_tour(tour, costs.astype(np.float32), clusters)
     assert tour.stats.detail["nodes"] <= 400
     assert tour.cost < 1.05 * full.cost

@@ -114,7 +114,7 @@ def test_nothing_overlaps_much_afterwards(seed, bend):
 
 
 def test_almost_nothing_overlaps_afterwards_in_99_of_100_scenes():
-    scenes = [overlaps(seed, bend) for seed in range(100) for bend in (-0.5, 0.0, 0.5)]
+    scenes = [overlaps(seed, bend) for seed in range(40) for bend in (-0.5, 0.0, 0.5)]
     under_hull, between = np.percentile(scenes, 99, axis=0)
     assert under_hull < 0.05
     assert between < 0.06

@@ -64,7 +64,7 @@ def pushes_by(
     return made
 
 
-@settings(max_examples=6)
+@settings(max_examples=2)
 @given(
     friction=st.floats(0.1, 0.55),  # beyond the steepest push none slides
     scale=st.floats(0.5, 1.9),
@@ -103,7 +103,7 @@ def test_two_wild_pushes_of_twelve_change_little() -> None:
 
 def test_more_pushes_make_surer() -> None:
     rng = np.random.default_rng(5)
-    pushes = pushes_by(QuasiStatic(0.3, 1.2), 20, rng, noise=1e-3)
+    pushes = pushes_by(QuasiStatic(0.3, 1.2), 8, rng, noise=1e-3)
     few = identify(pushes[:2])
     many = identify(pushes)
     prior = ContactParameters()
@@ -119,7 +119,7 @@ def test_friction_at_a_wall_is_found_where_a_push_touched_it() -> None:
     )
     model = QuasiStatic(0.5, 1.0, static_friction=0.25)
     rng = np.random.default_rng(0)
-    pushes = pushes_by(model, 16, rng, noise=1e-4, static=wall)
+    pushes = pushes_by(model, 8, rng, noise=1e-4, static=wall)
     found = identify(pushes)
     assert found.saw_walls
     assert found.static_friction == pytest.approx(0.25, abs=0.1)

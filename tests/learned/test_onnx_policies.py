@@ -164,6 +164,7 @@ class TestGood:
         seen = np.zeros(policy.observation.shape, policy.observation.dtype)
         assert len(policy.specification.action.steps(policy.decide(seen)))
 
+    @pytest.mark.slow
     def test_bench_compares_it(self, tmp_path):
         path = turning(tmp_path / "turn.onnx", 0.0)
         results = bench("maze-2d-3", [f"onnx:{path}", "straight"], episodes=2, workers=0)

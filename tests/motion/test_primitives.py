@@ -41,7 +41,7 @@ def test_config_is_checked() -> None:
         PrimitiveConfig(radius=float("nan"))
 
 
-@settings(max_examples=80)
+@settings(max_examples=25)
 @given(
     heading=st.floats(-3.1, 3.1),
     distance=st.floats(0.01, 20.0),

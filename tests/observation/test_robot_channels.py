@@ -82,7 +82,7 @@ def test_robot_distance_is_the_shortest_way_to_each_pixel(
     graph, pixel = VisibilityGraph(static), 10.0 / 96
     per_metre = 255.0 / math.hypot(*view.window)
     compared = 0
-    while compared < 150:
+    while compared < 60:
         pose = tuple(rng.uniform([0.3, 0.3, -3], [9.7, 9.7, 3]))
         if parts.distance(shapely.Point(pose[:2])) < 0.05:
             continue

@@ -217,7 +217,7 @@ def test_bad_settings_are_refused(bad: dict[str, Any]) -> None:
         ObjectTracker(**bad)
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(st.integers(0, 10**6))
 def test_whatever_is_seen_gives_valid_objects(seed: int) -> None:
     rng = np.random.default_rng(seed)

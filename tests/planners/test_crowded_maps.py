@@ -46,7 +46,7 @@ def test_what_is_made_of_a_large_map_is_made_in_pieces():
 
 @pytest.mark.parametrize("name", PLANNERS)
 def test_a_call_ends_at_the_look_that_fires(name):
-    for last in (1, 2, 4, 7, 9):
+    for last in (1, 4, 9):
         looks = Looks(last)
         result = make_planner(name).plan(posts(3000, seed=100 + last), stop=looks)
         assert result.status is PlanStatus.TIMED_OUT
@@ -80,6 +80,7 @@ def test_namo_looks_while_it_makes_its_grid():
         assert looks.count <= last + 8
 
 
+@pytest.mark.slow
 def test_thousands_of_obstacles_grow_together_as_each_would_alone():
     world = replace(posts(3000, seed=5), margin=0.03)
     others = [replace(world, margin=0.01 * k) for k in (4, 5, 6)]  # none of them is kept

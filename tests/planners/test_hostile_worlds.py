@@ -142,8 +142,8 @@ def test_a_speck_does_not_stop_the_clock():
     speck = Movables.from_outlines([SQUARE, 1e-5 * SQUARE], [[10, 9, 0.0], [9, 9, 0]])
     world = make_u_maze(movables=speck)
     planner = make_planner("kinodynamic-rrt")
-    assert planner.plan(world, stop=Deadline(0.3)).plan is not None
-    assert quickest(lambda: planner.plan(world, stop=Deadline(0.3))) < 0.5
+    assert planner.plan(world, stop=Deadline(0.15)).plan is not None
+    assert quickest(lambda: planner.plan(world, stop=Deadline(0.15))) < 0.35
 
 
 @pytest.mark.usefixtures("cpu_time")
@@ -180,7 +180,7 @@ def test_a_busy_thread_does_not_break_anothers_deadline():
         )
     )
     slow = GeometricRRT(GeometricRRTConfig(pass_iterations=10**6))
-    busy = threading.Thread(target=lambda: slow.plan(sealed, stop=Deadline(1.5)))
+    busy = threading.Thread(target=lambda: slow.plan(sealed, stop=Deadline(0.8)))
     world, planner = make_u_maze(scattered_boxes(3, 0)), make_planner("kinodynamic-rrt")
     busy.start()
     time.sleep(0.2)
@@ -191,7 +191,7 @@ def test_a_busy_thread_does_not_break_anothers_deadline():
     assert took < 0.5
 
 
-@pytest.mark.parametrize("rate", [0.5, 3.0, 1e4])
+@pytest.mark.parametrize("rate", [0.5, pytest.param(3.0, marks=pytest.mark.slow), 1e4])
 def test_tight_turns_do_not_touch_walls_between_poses(rate):
     plank = RobotModel.from_outline(
         SQUARE * [1.2, 0.2],
@@ -202,7 +202,7 @@ def test_tight_turns_do_not_touch_walls_between_poses(rate):
     )
     rng = np.random.default_rng(0)
     posts = [0.02 * SQUARE + spot for spot in rng.uniform(1, 9, (25, 2))]
-    for seed in range(5):
+    for seed in range(2):
         world = World(
             plank,
             [0.7, 0.7, 0.8],
@@ -227,7 +227,7 @@ def test_tight_turns_do_not_touch_walls_between_poses(rate):
 
 @pytest.mark.parametrize("rate", [0.4, 1.0])
 def test_headings_of_a_plan_never_jump(rate):
-    for seed in range(8):
+    for seed in range(3):
         world = make_u_maze(scattered_boxes(5, seed), robot=make_robot(max_turn_rate=rate))
         plan = (
             KinodynamicRRT()

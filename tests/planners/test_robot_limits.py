@@ -26,7 +26,7 @@ HULLS = {
     "plank": np.array([[0.5, 0.12], [-0.5, 0.12], [-0.5, -0.12], [0.5, -0.12]]),
     "cart": np.array([[0.6, 0.25], [-0.1, 0.25], [-0.1, -0.25], [0.6, -0.25]]),
 }
-COUNTS = [5, pytest.param(60, marks=pytest.mark.slow)]
+COUNTS = [3, pytest.param(60, marks=pytest.mark.slow)]
 ITERATIONS = {"ship-predictive-published": 60}
 
 

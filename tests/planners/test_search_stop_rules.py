@@ -71,7 +71,7 @@ class TestEveryPlanner:
             .plan(start(name), stop=MaxIterations(limit), rng=np.random.default_rng(7))
             .plan
             is not None
-            for limit in (0, 3, 30, 2000)
+            for limit in (0, 3, 30, 600)
         ]
         assert found == sorted(found)
         assert found[-1]
@@ -112,13 +112,13 @@ class TestEveryPlanner:
             assert again.status is PlanStatus.CANCELLED and again.plan is None
 
     def test_a_rule_may_be_used_again(self, name):
-        rule = MaxIterations(600)
+        rule = MaxIterations(200)
         planner, world = make_planner(name), start(name)
         plans = [planner.plan(world, stop=rule, rng=np.random.default_rng(3)) for _ in range(2)]
         assert plans[0].plan == plans[1].plan
 
 
-@pytest.mark.parametrize("limit", [*range(0, 12), 37, 60, 211, 1000])
+@pytest.mark.parametrize("limit", [*range(0, 12, 3), 37, 211])
 @pytest.mark.parametrize("name", ["kinodynamic-rrt", "push-aware"])
 def test_where_the_clock_cuts_changes_nothing(name, limit, monkeypatch):
     made = []

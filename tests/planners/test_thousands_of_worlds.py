@@ -30,8 +30,8 @@ AS_PUBLISHED = "ship-lattice-published"
 """Its cost adds kilograms to metres, so that another unit of length gives another path."""
 ITERATIONS = {"ship-predictive-published": 40}
 PLANNERS = planner_names()
-COUNTS = [6, pytest.param(150, marks=pytest.mark.slow)]
-FEW = [3, pytest.param(40, marks=pytest.mark.slow)]
+COUNTS = [4, pytest.param(150, marks=pytest.mark.slow)]
+FEW = [2, pytest.param(40, marks=pytest.mark.slow)]
 
 
 @pytest.fixture

@@ -84,7 +84,7 @@ CASES = [
     if (i + j + k + m) % 4 == 0
 ]
 FEW = [
-    pytest.param(*case, marks=[] if n % 12 == 0 else pytest.mark.slow)
+    pytest.param(*case, marks=[] if n % 24 == 0 else pytest.mark.slow)
     for n, case in enumerate(CASES)
 ]
 

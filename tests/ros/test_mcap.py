@@ -56,7 +56,7 @@ def maze() -> Episode:
     "task",
     [
         "maze",
-        "ship_ice",
+        pytest.param("ship_ice", marks=pytest.mark.slow),
         pytest.param("box_delivery", marks=pytest.mark.slow),
         pytest.param("area_clearing", marks=pytest.mark.slow),
     ],
@@ -242,7 +242,10 @@ def test_commands_write_and_score_mcap(
     assert "--out writes one episode" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("cut", [0, 8, 30, 5000, 0.5, -1, -40])
+@pytest.mark.parametrize(
+    "cut",
+    [0, 0.5, -1, *(pytest.param(cut, marks=pytest.mark.slow) for cut in (8, 30, 5000, -40))],
+)
 def test_a_truncated_file_is_one_clear_error(tmp_path: Path, maze: Episode, cut: float) -> None:
     path = tmp_path / "cut.mcap"
     save_episode(maze, path)
@@ -253,7 +256,15 @@ def test_a_truncated_file_is_one_clear_error(tmp_path: Path, maze: Episode, cut:
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("compression", [*CompressionType, None])
+@pytest.mark.parametrize(
+    "compression",
+    [
+        None,
+        CompressionType.ZSTD,
+        pytest.param(CompressionType.LZ4, marks=pytest.mark.slow),
+        pytest.param(CompressionType.NONE, marks=pytest.mark.slow),
+    ],
+)
 def test_a_file_without_a_summary_is_read(
     tmp_path: Path, maze: Episode, compression: CompressionType | None
 ) -> None:
@@ -299,7 +310,7 @@ def test_a_damaged_file_is_one_clear_error(tmp_path: Path, maze: Episode) -> Non
     path, rng = tmp_path / "bad.mcap", np.random.default_rng(5)
     save_episode(maze, path)
     data, refused = path.read_bytes(), 0
-    for _ in range(40):
+    for _ in range(15):
         damaged = bytearray(data)
         place = int(rng.integers(len(data)))
         damaged[place] ^= 0x55
@@ -309,7 +320,7 @@ def test_a_damaged_file_is_one_clear_error(tmp_path: Path, maze: Episode) -> Non
         except SchemaError as error:
             assert "\n" not in str(error)
             refused += 1
-    assert refused > 20
+    assert refused > 7
 
 
 def test_another_mcap_file_is_refused_by_its_topics(tmp_path: Path) -> None:

@@ -252,6 +252,8 @@ SHAPES = {
     "a figure eight": [(2, 1.5), (3, 2.5), (3, 0.5), (1, 2.5), (1, 0.5), (2, 1.5)],
     "there and back": [(1, 1), (3, 1), (1, 1)],
 }
+DRIVEN = [("a loop", 100.0), ("passes its end", 3.0), ("there and back", 100.0)]
+"""The slow tests drive every shape, with stamps of both kinds."""
 
 
 def given_path(corners, stamp=100.0):
@@ -280,13 +282,9 @@ def empty_room(*blocks):
 @pytest.mark.parametrize(
     ("shape", "stamp"),
     [
-        *((shape, 100.0) for shape in SHAPES),
-        ("passes its end", 3.0),
-        *(
-            pytest.param(shape, 3.0, marks=pytest.mark.slow)
-            for shape in SHAPES
-            if shape != "passes its end"
-        ),
+        pytest.param(shape, stamp, marks=() if (shape, stamp) in DRIVEN else pytest.mark.slow)
+        for shape in SHAPES
+        for stamp in (3.0, 100.0)
     ],
 )
 def test_a_path_that_passes_its_own_end_is_driven_to_its_end(shape, stamp):
@@ -355,7 +353,7 @@ def test_an_unknown_controller_is_refused_before_there_is_a_goal():
     assert code_of(lambda: Robot(controller="paht")) == "INVALID_CONTROLLER"
 
 
-@pytest.mark.parametrize("back", [0.3, 50.0])
+@pytest.mark.parametrize("back", [pytest.param(0.3, marks=pytest.mark.slow), 50.0])
 def test_a_clock_that_steps_back_stops_the_robot_and_the_path_is_driven_on(back):
     path, length = given_path(SHAPES["passes its end"])
     robot = Robot((0.5, 1.0, 0.0), patience=(3.0, 1.0))

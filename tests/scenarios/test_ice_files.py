@@ -237,8 +237,8 @@ def test_archives_that_unpack_to_a_flood_are_refused(tmp_path):
 def test_floes_that_no_time_moves_apart_are_refused_in_a_moment(tmp_path):
     path = tmp_path / "ice.json"
     rng = np.random.default_rng(0)
-    heap = [np.add(SQUARE, at).tolist() for at in rng.uniform(0.0, 11.0, (150, 2))]
-    path.write_text(json.dumps({"polygons": heap, "bounds": [0, 0, 12.4, 12.4]}))
+    heap = [np.add(SQUARE, at).tolist() for at in rng.uniform(0.0, 8.0, (80, 2))]
+    path.write_text(json.dumps({"polygons": heap, "bounds": [0, 0, 9.1, 9.1]}))
     began = time.process_time()
     with pytest.raises(InvalidInputError, match="could not be moved apart: of"):
         load_ice(path)

@@ -29,7 +29,7 @@ scenarios = st.builds(
 )
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(st.lists(scenarios, max_size=4))
 def test_yaml_file_gives_back_equal_scenarios(tmp_path_factory, items):
     path = tmp_path_factory.mktemp("scenarios") / "s.yaml"

@@ -19,7 +19,7 @@ def test_a_search_can_be_driven_from_outside() -> None:
     assert tree.path(4).tolist() == [[3, -1], [4, 9]]
 
 
-@settings(max_examples=50)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 2**32 - 1), rows=st.integers(1, 12), columns=st.integers(1, 12))
 def test_costs_on_a_grid_are_those_of_scipy(seed: int, rows: int, columns: int) -> None:
     rng = np.random.default_rng(seed)

@@ -136,6 +136,7 @@ def test_the_client_needs_python_3_8_and_its_standard_library_alone():
     assert {name.partition(".")[0] for name in names} <= sys.stdlib_module_names
 
 
+@pytest.mark.slow
 def test_the_example_runs_as_it_is_shipped(tmp_path):
     done: Any = subprocess.run(
         [sys.executable, str(CLIENT)],

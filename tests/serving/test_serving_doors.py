@@ -236,7 +236,7 @@ def fuzz(address_of: Any, count: int) -> int:
 
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
-@pytest.mark.parametrize("count", [300, pytest.param(10_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [100, pytest.param(10_000, marks=pytest.mark.slow)])
 def test_mutated_messages_harm_nobody_else(count, tmp_path):
     with served("straight", tmp_path) as server:
         over, driven = threading.Event(), []
@@ -275,7 +275,7 @@ WORLD["movables"][0]["contact_radius"] = 0.02
 
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
-@pytest.mark.parametrize("size", [1.7e308, -1e154, 5e-324])
+@pytest.mark.parametrize("size", [pytest.param(1.7e308, marks=pytest.mark.slow), -1e154, 5e-324])
 def test_numbers_without_sense_do_not_overflow(size):
     """Each number of a world in turn: it is refused by a rule, or the policy acts."""
     session = Session(lambda: make_policy("straight"), "straight", ServerLimits())

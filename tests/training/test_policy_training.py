@@ -543,6 +543,7 @@ class TestSamLearner:
             trained(tiny("sam", options=options), tmp_path / "run", data)
         assert trained(tiny("sam"), tmp_path / "run", data) is not None  # the folder is free
 
+    @pytest.mark.slow
     def test_weights_that_are_no_numbers_are_refused(self, tmp_path, data):
         import onnx
 
@@ -556,6 +557,7 @@ class TestSamLearner:
         with pytest.raises(InvalidInputError, match="not finite"):
             trained(tiny("sam", options=options), tmp_path / "run", data)
 
+    @pytest.mark.slow
     def test_it_learns_which_pixel_pays(self, tmp_path):
         options = {"rate": 0.01, "batch": 16, "buffer": 256, "widths": [8, 8], "blocks": 1}
         options |= {"discount": 0.0, "target_every": 20}

@@ -175,7 +175,7 @@ def outlines(draw):
 
 
 @given(outlines())
-@settings(max_examples=60)
+@settings(max_examples=25)
 def test_any_outline_keeps_its_area_to_one_percent(points):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", OutlineWarning)

@@ -117,16 +117,23 @@ print("done")
     assert run(others, "-c", program).endswith("done\n")
 
 
-@pytest.mark.parametrize(
-    ("kind", "name", "said"),
-    [
-        ("planners", "other-planner", "Plans as `straight`."),
-        ("policies", "other-policy", "Stands."),
-        ("tasks", "other_maze", "A maze of another name."),
-        ("metrics", "turning", "How far the robot turned [rad]."),
-        ("robots", "quick_burger", "A TurtleBot3 of 1 m/s."),
-    ],
-)
-def test_the_command_line_lists_them(kind: str, name: str, said: str, others: Path) -> None:
-    listed = json.loads(run(others, "-m", "pushplan", "list", kind, "--json"))
-    assert [one["description"] for one in listed if one["name"] == name] == [said]
+NAMES = {
+    "planners": ("other-planner", "Plans as `straight`."),
+    "policies": ("other-policy", "Stands."),
+    "tasks": ("other_maze", "A maze of another name."),
+    "metrics": ("turning", "How far the robot turned [rad]."),
+    "robots": ("quick_burger", "A TurtleBot3 of 1 m/s."),
+}
+
+
+def test_the_command_line_lists_them(others: Path) -> None:
+    program = f"""
+from pushplan.cli import main
+for kind in {[*NAMES]}:
+    assert main(["list", kind, "--json"]) == 0
+    print("\\0")
+"""
+    lists = run(others, "-c", program).split("\0")
+    for (name, said), text in zip(NAMES.values(), lists, strict=False):
+        found = [one["description"] for one in json.loads(text) if one["name"] == name]
+        assert found == [said]

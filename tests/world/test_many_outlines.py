@@ -29,7 +29,7 @@ def is_good(corners):
         return False
 
 
-@settings(max_examples=150)
+@settings(max_examples=60)
 @given(outlines)
 def test_the_same_are_well_formed(many):
     points = [np.array(corners).reshape(-1, 2) for corners in many]

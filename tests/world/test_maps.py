@@ -39,7 +39,7 @@ def cells_of(grid, side, origin):
     return shapely.union_all(squares)
 
 
-@settings(max_examples=150)
+@settings(max_examples=60)
 @given(arrays(np.bool_, SHAPES))
 def test_rectangles_cover_the_occupied_cells_and_no_other(grid):
     covered = np.zeros_like(grid)

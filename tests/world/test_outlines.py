@@ -129,7 +129,7 @@ sizes = st.floats(0.01, 100.0)
 places = st.floats(-200.0, 200.0)
 
 
-@settings(max_examples=200)
+@settings(max_examples=80)
 @given(sides, sizes, places, places, st.floats(0.0, 7.0))
 def test_convex_polygons_stay_convex_in_float32(count, size, x, y, turn):
     angles = turn + 2.0 * np.pi * np.arange(count) / count

@@ -88,6 +88,7 @@ def code_in_words(run: dict[str, Any]) -> str:
     return f"{run['pushplan']}{commit}{' with changes' if run['changed'] else ''}"
 
 
+@functools.cache
 def packages() -> dict[str, str]:
     """Versions of those of `PACKAGES` that are installed."""
     found = {}

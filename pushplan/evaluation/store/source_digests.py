@@ -95,11 +95,13 @@ def _sources(where: str) -> list[Path]:
         first: Path | None = Path(where).resolve()
     else:
         first = _file_of(where)
-    found = [] if first is None or not first.is_file() else [first]
-    path = import_path(str(found[0].parent) if found else None)
+    if first is None or not first.is_file():
+        return []
+    found = [first]
+    path = _dated(import_path(str(first.parent)))
     for file in found:  # which grows meanwhile
         for level, name in _imports(file, *_version(file)):
-            folders = [str(file.parents[level - 1])] if level else path
+            folders = _dated([str(file.parents[level - 1])]) if level else path
             found += [one for one in _modules(name, folders) if one not in found]
     return found
 
@@ -137,17 +139,37 @@ def _imports(file: Path, *_version: int) -> tuple[tuple[int, str], ...]:
     return tuple(found)
 
 
-def _modules(name: str, folders: Sequence[str] | None) -> Iterator[Path]:
+def _modules(name: str, folders: Sequence[tuple[str, int]]) -> Iterator[Path]:
     """Local files of a module, and of the packages around it."""
     for part in name.split("."):
-        spec = PathFinder.find_spec(part, folders) if folders else None
+        if not folders or _is_installed(part, tuple(folders)):
+            return
+        spec = PathFinder.find_spec(part, [folder for folder, _ in folders])
         if spec is None:
             return
         if spec.has_location and spec.origin is not None:
-            if not is_a_users(spec.origin):
-                return
             yield Path(spec.origin).resolve()
-        folders = spec.submodule_search_locations
+        folders = _dated(spec.submodule_search_locations or ())
+
+
+def _dated(folders: Iterable[str]) -> tuple[tuple[str, int], ...]:
+    """Folders, and when something was put into each or taken out of it last."""
+    dated = []
+    for folder in folders:
+        changed = 0
+        with contextlib.suppress(OSError):
+            changed = os.stat(folder or os.curdir).st_mtime_ns
+        dated.append((folder, changed))
+    return tuple(dated)
+
+
+@functools.lru_cache(maxsize=1024)
+def _is_installed(part: str, folders: tuple[tuple[str, int], ...]) -> bool:
+    """True if the first module of this name in these folders is none of a user's."""
+    spec = PathFinder.find_spec(part, [folder for folder, _ in folders])
+    if spec is None or not spec.has_location or spec.origin is None:
+        return False
+    return not is_a_users(spec.origin)
 
 
 @functools.lru_cache(maxsize=1024)

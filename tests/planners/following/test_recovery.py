@@ -45,7 +45,7 @@ DRIVES = [
     *((0.02, delay, effect) for effect in (1.0, 0.2) for delay in (0, 8)),
 ]
 """Period [s], delay in periods, and the part of a command that has an effect."""
-QUICK = [(0, 0.15, 1, 1.0), (0, 0.15, 0, 0.2), (5017, 0.15, 1, 1.0)]
+QUICK = [(0, 0.15, 0, 0.2), (5017, 0.15, 1, 1.0)]
 REVERSING = {"drive": "differential", "min_speed": -0.1}
 
 
@@ -270,6 +270,7 @@ def test_getting_on_is_told_from_swaying(turn_rate):
     assert not swayed and swaying.idle > 50.0
 
 
+@pytest.mark.slow
 def test_a_robot_without_a_plan_does_not_run_away():
     class NoPlan:
         def plan(self, world, *, stop=None, rng=None):

@@ -156,7 +156,7 @@ def test_rollouts_end_in_the_goal_and_at_walls():
     assert 5.5 < rollouts.paths[0, rollouts.ends[0], 1] < 6.0
 
 
-@pytest.mark.parametrize("name", ["mppi", "cem"])
+@pytest.mark.parametrize("name", ["mppi", pytest.param("cem", marks=pytest.mark.slow)])
 def test_it_reaches_the_goal_and_the_same_seed_gives_the_same_commands(name):
     runs = []
     for _ in range(2):
@@ -196,6 +196,7 @@ def test_decisions_that_take_time_are_driven_from_where_they_are_due():
     assert policy.plan_log
 
 
+@pytest.mark.slow
 def test_a_box_is_pushed_out_of_an_area():
     area = ClearanceArea(6.0 * SQUARE + 5.0, np.ones(4, np.bool_))
     world = replace(room(Drive.DIFFERENTIAL, walls=False, goal=area), robot=box_delivery_robot())

@@ -78,7 +78,9 @@ def keeps_from_walls(found: Plan, world: World, margin: float = 0.0) -> bool:
     return checker.first_blocked(found.poses) == len(found.poses)
 
 
-@pytest.mark.parametrize("layout", ["one_box", "aside", "order"])
+@pytest.mark.parametrize(
+    "layout", ["one_box", "aside", pytest.param("order", marks=pytest.mark.slow)]
+)
 def test_plans_open_the_way_and_touch_no_wall(layout: str) -> None:
     world, boxes = start(layout)
     found = plan(world, straight_iterations=0)

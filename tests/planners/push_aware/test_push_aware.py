@@ -147,7 +147,7 @@ def test_the_bound_holds_for_every_plan_of_a_long_run(drive):
     robot = make_robot(drive=drive, max_turn_rate=0.3)
     planner = PushAware(PushAwareConfig(margin=0.0))
     poses = ([11.25, 3.75, np.pi / 2], [10.0, 9.0, 2.0], [5.0, 9.0, 1.5], [3.0, 7.5, 1.5])
-    for seed, pose in enumerate(poses):
+    for seed, pose in enumerate(poses[:: 1 if drive == "differential" else 3]):
         world = make_u_maze(scattered_boxes(2, seed), robot=robot, robot_pose=pose)
         result = planner.plan(world, stop=MaxIterations(4000), rng=generator(seed))
         detail = result.stats.detail
@@ -397,8 +397,8 @@ def test_two_hundred_boxes_and_a_deadline():
     world = make_u_maze(movables=Movables.from_outlines([0.5 * SQUARE] * len(small), small))
     assert len(world.movables) > 140
     planner = PushAware()
-    planner.plan(world, stop=Deadline(0.3))
-    assert quickest(lambda: planner.plan(world, stop=Deadline(0.3))) < 0.3 + 1.0
+    planner.plan(world, stop=Deadline(0.1))
+    assert quickest(lambda: planner.plan(world, stop=Deadline(0.1))) < 0.1 + 1.0
 
 
 @pytest.mark.usefixtures("cpu_time")

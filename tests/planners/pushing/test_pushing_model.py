@@ -201,7 +201,7 @@ def test_forces_obey_coulomb_and_the_limit_surface(robot, friction, offset, angl
             assert shear * (ut - vt) >= -1e-9
 
 
-@settings(max_examples=60)
+@settings(max_examples=25)
 @example(turtlebot3_burger("collector"), 0.75, 0.25, 0.0, 1.0, 3.0)
 @given(robots, st.floats(0.0, 1.0), unit, unit, unit, st.floats(0.3, 30.0))
 def test_mirrored_and_scaled_pushes(robot, friction, offset, angle, bend, factor):

@@ -158,7 +158,7 @@ def test_nothing_static_is_touched(case):
 spots = st.floats(-3.0, 3.0)
 
 
-@settings(max_examples=60)
+@settings(max_examples=25)
 @given(spots, spots, st.floats(-4.0, 4.0), spots, spots, st.floats(-4.0, 4.0), st.booleans())
 def test_commands_are_always_within_limits(x, y, theta, bx, by, turn, burger):
     robot = PUSHER if burger else jackal("pusher")

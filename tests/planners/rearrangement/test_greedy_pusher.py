@@ -100,7 +100,7 @@ def test_closed_edges_are_not_pushed_through():
     assert goal_heading(scene([(1.4, -1.4, 0.0)], goal=area)) == pytest.approx(np.pi / 2, abs=0.01)
 
 
-@pytest.mark.parametrize("layout", ["clear", "walled"])
+@pytest.mark.parametrize("layout", ["clear", pytest.param("walled", marks=pytest.mark.slow)])
 def test_it_clears_the_area(layout):
     _, info = run("area_clearing", "testbed", 0, 900, layout=layout)
     assert info["success"] and info["completed"].all()

@@ -58,8 +58,14 @@ def run(policy, *, task, preset, seed, limit=1500, disturb=None, **options):
 
 EPISODES = [
     ("area_clearing", "benchmark", "pymunk", {"layout": "clear_small", "boxes": 3}),
-    ("area_clearing", "testbed", "mujoco", {"layout": "clear_small", "boxes": 2}),
-    ("box_delivery", "benchmark", "pymunk", {"layout": "small_empty", "boxes": 2}),
+    pytest.param(
+        *("area_clearing", "testbed", "mujoco", {"layout": "clear_small", "boxes": 2}),
+        marks=pytest.mark.slow,
+    ),
+    pytest.param(
+        *("box_delivery", "benchmark", "pymunk", {"layout": "small_empty", "boxes": 2}),
+        marks=pytest.mark.slow,
+    ),
     ("box_delivery", "testbed", "mujoco", {"layout": "small_empty", "boxes": 2}),
 ]
 
@@ -153,6 +159,7 @@ def test_the_rollouts_of_a_choice_are_bounded():
     assert commands[0] == commands[2] != Twist(0.0, 0.0)  # an own budget is the same one
 
 
+@pytest.mark.slow
 def test_a_choice_that_ran_out_of_budget_leaves_less_to_the_next(monkeypatch):
     """Searches that it came to the end of are kept, so that the robot does not search for ever."""
     budgets = []

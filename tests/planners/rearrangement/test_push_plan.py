@@ -26,7 +26,7 @@ def test_gtsp_mpc_shows_the_push_in_hand() -> None:
     policy.reset(env.world, np.random.default_rng(0))
     assert policy.current_plan is None
     seen = []
-    for _ in range(400):
+    for _ in range(250):
         command = policy.act(env.world, None)
         plan = policy.current_plan
         if plan is not None and (not seen or plan is not seen[-1][1]):

@@ -104,7 +104,7 @@ def check_random_world(seed: int, planner: ShipLattice) -> None:
         assert abs(world.robot_pose[2] - np.pi / 2) > 0.3
 
 
-@pytest.mark.parametrize("seed", range(25))
+@pytest.mark.parametrize("seed", range(10))
 def test_random_worlds(seed: int) -> None:
     check_random_world(seed, ShipLattice(QUICK))
 
@@ -149,7 +149,7 @@ def post_world(seed: int) -> World:
 def test_goal_discs_in_random_halls() -> None:
     planner = ShipLattice(ShipLatticeConfig.quick())
     solved = 0
-    for seed in range(40):
+    for seed in range(15):
         world = post_world(seed)
         result = planner.plan(world)
         if result.plan is None:
@@ -161,7 +161,7 @@ def test_goal_discs_in_random_halls() -> None:
         for pose in result.plan.poses:
             outline = Polygon(transform(pose, world.robot.parts[0]))
             assert outline.intersection(walls).area < 1e-9
-    assert solved >= 38  # a start with its bow at a post
+    assert solved >= 14  # a start with its bow at a post
 
 
 def test_golden_open_water() -> None:

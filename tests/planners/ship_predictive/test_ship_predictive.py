@@ -93,7 +93,7 @@ class TestEveryPredictivePlanner:
 
     def test_it_moves_less_ice_than_going_straight(self, name):
         ratios = []
-        for seed in (1001, 1002, 1003):
+        for seed in (1001, 1002):
             world = ice(0.3, seed)
             straight = IceInteraction().sweep(world, along_y(world)).work
             ratios.append(make_planner(name).plan(world).plan.interaction_cost / straight)
@@ -153,7 +153,7 @@ class TestEveryPredictivePlanner:
         world = ice(0.3, 1005)
         costs = [
             make_planner(name).plan(world, stop=MaxIterations(limit)).stats.detail["cost"]
-            for limit in (20, 120, 500)
+            for limit in (20, 60, 200)
         ]
         assert costs[0] >= costs[1] >= costs[2]
 
@@ -171,7 +171,7 @@ def turn_fits(world, side):
     return bool((np.abs(xs[:end]) < 6.0).all() and (ys[:end] > -1.0).all())
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(seed=st.integers(0, 100_000))
 def test_plans_from_anywhere_can_be_driven(seed):
     rng = np.random.default_rng(seed)
@@ -270,7 +270,7 @@ def test_waters_of_any_size(name, bounds, goal, status):
 
 def test_every_stop_leaves_a_whole_plan_or_none():
     world = ice(0.3)
-    for limit in range(4, 24):
+    for limit in range(4, 24, 3):
         plan = PredictiveShipNetwork().plan(world, stop=MaxIterations(limit)).plan
         if plan is not None:  # the floes along it may not have been worked out in time
             assert world.goal.distance(*plan.poses[-1, :2]) <= 1e-9
@@ -286,7 +286,7 @@ def test_a_ship_that_heads_back_turns_round():
 
 
 def test_a_larger_weight_moves_less_ice():
-    worlds = [ice(0.3, seed) for seed in (1006, 1007, 1008)]
+    worlds = [ice(0.3, 1006)]
     works = [
         sum(
             PredictiveShip(PredictiveConfig(push_weight=w)).plan(world).plan.interaction_cost
@@ -297,7 +297,9 @@ def test_a_larger_weight_moves_less_ice():
     assert works[1] < works[0]
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    "name", ["ship-predictive", pytest.param("ship-predictive-network", marks=pytest.mark.slow)]
+)
 def test_the_policy_crosses_the_ice(name):
     from pushplan.envs import make
     from pushplan.evaluation import run_episode
