@@ -429,9 +429,10 @@ void bind_path_search(nb::module_& module) {
           "estimate"_a = nb::none(), nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>(),
           nb::keep_alive<1, 5>(), nb::keep_alive<1, 7>(), ReleaseGil())
       .def("run", &VisibilitySearch::run, "budget"_a, ReleaseGil())
-      .def_prop_ro("end", &VisibilitySearch::end)
-      .def_prop_ro(
-          "parents", [](const VisibilitySearch& s) { return copied(s.parents()); }, kOwned);
+      .def("path", [](VisibilitySearch& s) {
+        const std::vector<Index> nodes = s.path();
+        return copied(std::span<const Index>(nodes));
+      }, kOwned);
 }
 
 void bind_shadows(nb::module_& module) {

@@ -113,15 +113,11 @@ class VisibilityGraph:
             outcome = search.run(_BUDGET)
         if outcome == core.SearchOutcome.EXHAUSTED:
             return Path(math.inf)
-        path = [free]
-        parents = search.parents
-        at = search.end
-        while at >= 0:
-            path.insert(1, points[at])
-            at = int(parents[at])
+        nodes = search.path()
+        path = [free, *points[nodes]]
         length = 0.0
         exits = []
-        if search.end < len(contours.corners):  # it goes on into the goal
+        if len(nodes) == 0 or nodes[-1] < len(contours.corners):  # it goes on into the goal
             length, x, y = scene.goal_leg(*path[-1].tolist())
             if length > 0.0:
                 exits.append(np.array([x, y]))

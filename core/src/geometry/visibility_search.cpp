@@ -172,4 +172,21 @@ VisibilitySearch::Outcome VisibilitySearch::run(Index budget) {
   return Outcome::kPaused;
 }
 
+std::vector<Index> VisibilitySearch::path() {
+  std::vector<Index> nodes;
+  for (Index node = end_; node != kStart; node = parents_[at(node)]) nodes.push_back(node);
+  nodes.push_back(kStart);
+  std::reverse(nodes.begin(), nodes.end());
+  for (std::size_t i = 1; estimate_ != nullptr && i + 1 < nodes.size();) {
+    if (sight_.sees(place(nodes[i - 1]), place(nodes[i + 1]), scene_.gap)) {
+      nodes.erase(nodes.begin() + static_cast<std::ptrdiff_t>(i));
+      i = std::max<std::size_t>(i - 1, 1);
+    } else {
+      ++i;
+    }
+  }
+  nodes.erase(nodes.begin());
+  return nodes;
+}
+
 }  // namespace pushplan

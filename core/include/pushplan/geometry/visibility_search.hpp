@@ -49,10 +49,9 @@ class VisibilitySearch {
   /// Goes on for about `budget` corners looked at, or lines tested.
   Outcome run(Index budget);
 
-  /// The last node of the path found.
-  Index end() const { return end_; }
-  /// The node before each that has been reached, (V + E,).
-  std::span<const Index> parents() const { return parents_; }
+  /// The nodes of the path found, without the start. Where estimates were used, those are left out
+  /// whose neighbours see each other.
+  std::vector<Index> path();
 
  private:
   /// A way of getting to a node, in most cases not tested yet.
