@@ -14,7 +14,7 @@ MOST_ROUGHNESS = 0.4
 """With more, floes would be stars."""
 _EDGE_RADII = 0.06  # length of an edge, in mean radii of the field
 _CORNERS = (24, 300)
-_WAVES = np.arange(2, 60)  # periods round a floe
+_LEAST_EDGES = 8  # of a wave: small floes are smoother than large ones
 _DECAY = 1.7  # of their amplitudes with the number of periods
 _MOST_BAYS = 3
 _BAY_DEPTHS = (3.0, 10.0)  # in standard deviations of the waves
@@ -68,9 +68,10 @@ def _rough_outline(
 
 def _depths(rng: np.random.Generator, angles: FloatArray) -> FloatArray:
     """Depths (N,) of the outline at some angles, from 0, in no unit."""
-    amplitudes = rng.standard_normal(len(_WAVES)) * _WAVES**-_DECAY
-    phases = rng.uniform(0.0, 2.0 * np.pi, len(_WAVES))
-    waves = (amplitudes * np.cos(np.outer(angles, _WAVES) + phases)).sum(axis=1)
+    periods = np.arange(2.0, max(3, len(angles) // _LEAST_EDGES))
+    amplitudes = rng.standard_normal(len(periods)) * periods**-_DECAY
+    phases = rng.uniform(0.0, 2.0 * np.pi, len(periods))
+    waves = (amplitudes * np.cos(np.outer(angles, periods) + phases)).sum(axis=1)
     depth: FloatArray = (waves - waves.min()) / waves.std()
     for _ in range(int(rng.integers(_MOST_BAYS + 1))):
         turn = np.angle(np.exp(1j * (angles - rng.uniform(0.0, 2.0 * np.pi))))
