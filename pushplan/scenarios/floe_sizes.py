@@ -59,9 +59,8 @@ class FloeSizes(CheckedFields):
         if self.exponent is None:
             return self.mean_radius
         n = self.exponent
-        low, high = self.least, self.greatest
-        ratio = (low ** (1.0 - n) - high ** (1.0 - n)) / (low**-n - high**-n)
-        return float(n / (n - 1.0) * ratio)
+        moment = self.least ** (1.0 - n) - self.greatest ** (1.0 - n)
+        return float(n / (n - 1.0) * moment / (self.least**-n - self.greatest**-n))
 
     def draw(self, rng: np.random.Generator, total_area: float) -> FloatArray:
         """Areas [m²], largest first, whose sum is ``total_area`` [m²] where that is possible.
@@ -88,6 +87,7 @@ class FloeSizes(CheckedFields):
         if self.exponent is None:
             middle = np.log(self.mean_radius) - 0.5 * self.spread**2
             return np.asarray(np.exp(middle + self.spread * rng.standard_normal(count)))
-        low, high = self.least**-self.exponent, self.greatest**-self.exponent
-        radii: FloatArray = (low + rng.random(count) * (high - low)) ** (-1.0 / self.exponent)
+        least = self.least**-self.exponent
+        span = self.greatest**-self.exponent - least
+        radii: FloatArray = (least + rng.random(count) * span) ** (-1.0 / self.exponent)
         return radii
