@@ -96,8 +96,8 @@ void bind_shapes(nb::module_& module) {
         return numbers;
       },
       "vertices"_a.noconvert(), "offsets"_a.noconvert(), "budget"_a,
-      "Which of some convex pieces are to be merged: the number of the convex part of each, so that "
-      "the areas of the hulls beyond those of the pieces add up to at most a budget [m^2].");
+      "Merges some convex pieces, of which this returns the number of the convex part of each, so "
+      "that the areas of the hulls beyond those of the pieces add up to at most a budget [m^2].");
   module.def(
       "polygon_area", [](const Points& polygon) { return polygon_area(corners_of(polygon)); },
       "polygon"_a.noconvert());

@@ -8,10 +8,10 @@
 
 namespace pushplan {
 
-/// Says which of some convex pieces, which touch along whole edges, are to be merged into one convex
-/// part: again and again the two neighbours whose hull has the least area beyond theirs, as Hertel
-/// and Mehlhorn do where it has none, until a merger would bring these areas above `budget` [m^2].
-/// Returns the number of the part of each piece, 0 to K - 1.
+/// Merges convex pieces that touch along whole edges into few convex parts: again and again the two
+/// neighbours whose hull has the least area beyond theirs, as Hertel and Mehlhorn do where it has
+/// none, until a merger would bring these areas above `budget` [m^2]. Returns the number of the
+/// part of each piece, 0 to K - 1.
 std::vector<Index> merge_pieces(const Polygons& pieces, double budget);
 
 }  // namespace pushplan

@@ -87,11 +87,11 @@ class IceContacts {
 
   IceBodies bodies_;
   IceSettings settings_;
-  std::vector<Vec2> hull_;     // corners in the world frame
-  std::vector<Vec2> corners_;  // of the floes' parts, kept up to date
-  std::vector<Box> boxes_;     // around the parts, and around those of the hull: only where there
+  std::vector<Vec2> hull_;       // corners in the world frame
+  std::vector<Vec2> corners_;    // of the floes' parts, kept up to date
+  std::vector<Box> boxes_;       // around the parts, and around those of the hull: only where there
   std::vector<Box> hull_boxes_;  // are floes of several parts
-  std::vector<Pose> moves_;    // displacement of each floe in this step
+  std::vector<Pose> moves_;      // displacement of each floe in this step
   std::vector<State> state_;
   std::vector<ContactPoint> points_;
   std::size_t most_points_;  // more are left out
