@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <tuple>
+#include <vector>
 
 #include "arrays.hpp"
 #include "pushplan/geometry/convex.hpp"
+#include "pushplan/geometry/convex_parts.hpp"
 #include "pushplan/geometry/distance_field.hpp"
 #include "pushplan/geometry/goal_estimate.hpp"
 #include "pushplan/geometry/obstacle_grid.hpp"
@@ -86,6 +88,17 @@ void bind_shapes(nb::module_& module) {
       "convex_distance",
       [](const Points& a, const Points& b) { return convex_distance(points(a), points(b)); },
       "a"_a.noconvert(), "b"_a.noconvert());
+  module.def(
+      "merge_pieces",
+      [](const Points& vertices, const Integers<1>& offsets, double budget) {
+        const std::vector<Index> owners = merge_pieces(polygons(vertices, offsets), budget);
+        const auto numbers = zeros<Index, 1>({owners.size()});
+        std::copy(owners.begin(), owners.end(), view(numbers).begin());
+        return numbers;
+      },
+      "vertices"_a.noconvert(), "offsets"_a.noconvert(), "budget"_a,
+      "Merges some convex pieces, of which this returns the number of the convex part of each, so "
+      "that the areas of the hulls beyond those of the pieces add up to at most a budget [m^2].");
   module.def(
       "polygon_area", [](const Points& polygon) { return polygon_area(corners_of(polygon)); },
       "polygon"_a.noconvert());

@@ -23,12 +23,6 @@ Box joined(const Box& a, const Box& b) {
           std::max(a.y_max, b.y_max)};
 }
 
-Box box_around(Polygon outline) {
-  Box box{outline[0].x, outline[0].y, outline[0].x, outline[0].y};
-  for (const Vec2 p : outline) box = joined(box, {p.x, p.y, p.x, p.y});
-  return box;
-}
-
 /// True if an outline is convex, turns once, and has an area.
 bool is_convex(Polygon outline) {
   const bool finite = std::ranges::all_of(outline, [](Vec2 p) { return usable(p); });

@@ -13,6 +13,11 @@ def convex_overlap(a: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), or
 
 def convex_distance(a: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], b: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> float: ...
 
+def merge_pieces(vertices: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], offsets: Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C', device='cpu', writable=False)], budget: float) -> Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C')]:
+    """
+    Merges some convex pieces, of which this returns the number of the convex part of each, so that the areas of the hulls beyond those of the pieces add up to at most a budget [m^2].
+    """
+
 def polygon_area(polygon: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> float: ...
 
 def polygon_centroid(polygon: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> tuple[float, float]: ...

@@ -17,13 +17,16 @@ MARGIN = 0.003
 
 @dataclass(frozen=True)
 class FloeSizes(CheckedFields):
-    """Log-normal floe sizes. The radius of a floe is that of the disc with its area.
+    """Floe sizes, log-normal or by a power law. The radius of a floe is that of an equal disc.
 
     Args:
         mean_radius: mean of the log-normal distribution before it is cut off [m].
         spread: standard deviation of the logarithm of the radius.
         least: floes are no smaller [m].
         greatest: nor larger [m].
+        exponent: if given, the number of floes above a radius falls with this power of it, and mean
+            and spread do not matter. Rothrock and Thorndike (Journal of Geophysical Research 89,
+            1984) found 1.7 to 2.5 for the diameters of drifting floes.
 
     Raises:
         InvalidInputError: if they make no sense together.
@@ -35,14 +38,29 @@ class FloeSizes(CheckedFields):
     spread: Annotated[float, Limits(0.0, 2.0)] = 0.28
     least: PositiveFloat = 0.2
     greatest: PositiveFloat = 0.6
+    exponent: Annotated[float, Limits(1.1, 5.0)] | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.least <= self.mean_radius <= self.greatest or self.least == self.greatest:
+        if self.exponent is not None:
+            if not self.least < self.greatest:
+                raise InvalidInputError(
+                    f"ice radii must have least < greatest, got {self.least:g}, {self.greatest:g} m"
+                )
+        elif not self.least <= self.mean_radius <= self.greatest or self.least == self.greatest:
             raise InvalidInputError(
                 "ice radii must have least <= mean_radius <= greatest and least < greatest, got "
                 f"{self.least:g}, {self.mean_radius:g}, {self.greatest:g} m"
             )
+
+    @property
+    def typical_radius(self) -> float:
+        """Mean radius [m]; of log-normal sizes before they are cut off."""
+        if self.exponent is None:
+            return self.mean_radius
+        n = self.exponent
+        moment = self.least ** (1.0 - n) - self.greatest ** (1.0 - n)
+        return float(n / (n - 1.0) * moment / (self.least**-n - self.greatest**-n))
 
     def draw(self, rng: np.random.Generator, total_area: float) -> FloatArray:
         """Areas [m²], largest first, whose sum is ``total_area`` [m²] where that is possible.
@@ -52,10 +70,9 @@ class FloeSizes(CheckedFields):
         """
         high = np.pi * self.greatest**2 / (1.0 + MARGIN)
         low = min(high, np.pi * self.least**2 * (1.0 + 2.0 * MARGIN))
-        typical = np.pi * self.mean_radius**2
+        typical = np.pi * self.typical_radius**2
         count = int(1.5 * total_area / typical) + 32
-        middle = np.log(self.mean_radius) - 0.5 * self.spread**2
-        radii = np.exp(middle + self.spread * rng.standard_normal(4 * count))
+        radii = self._radii(rng, 4 * count)
         inside = radii[(radii >= self.least) & (radii <= self.greatest)]
         if len(inside) < count:
             inside = np.clip(radii, self.least, self.greatest)
@@ -65,3 +82,12 @@ class FloeSizes(CheckedFields):
         for _ in range(50):  # the last few per mille, within the range of sizes
             areas = np.clip(areas * (total_area / areas.sum()), low, high)
         return np.sort(areas)[::-1].copy()
+
+    def _radii(self, rng: np.random.Generator, count: int) -> FloatArray:
+        if self.exponent is None:
+            middle = np.log(self.mean_radius) - 0.5 * self.spread**2
+            return np.asarray(np.exp(middle + self.spread * rng.standard_normal(count)))
+        least = self.least**-self.exponent
+        span = self.greatest**-self.exponent - least
+        radii: FloatArray = (least + rng.random(count) * span) ** (-1.0 / self.exponent)
+        return radii

@@ -1,4 +1,4 @@
-"""Broken ice of a stated concentration: random convex floes that overlap nowhere."""
+"""Broken ice of a stated concentration: random floes that overlap nowhere."""
 
 from __future__ import annotations
 
@@ -12,9 +12,12 @@ from pushplan.core import geometry
 from pushplan.core import scenarios as core
 from pushplan.scenarios.floe_sizes import MARGIN, FloeSizes
 from pushplan.scenarios.ice_field import IceField
+from pushplan.scenarios.rough_floes import MOST_ROUGHNESS, roughened
 from pushplan.world import InvalidInputError, ScenarioError
 from pushplan.world.checks import FloatArray, IntArray, checked_bounds, number
-from pushplan.world.outline import convex_outlines, flatten, unflatten
+from pushplan.world.convex_shapes import disjoint
+from pushplan.world.outline import ConvexParts, convex_outlines, flatten, unflatten
+from pushplan.world.outline_repair import MOST_CHANGE
 
 MOST_FLOES = 20_000
 """More than this is refused: a typing error rather than a wish."""
@@ -36,15 +39,17 @@ def generate_ice(
     keep_off: Sequence[ArrayLike] = (),
     gap: float | None = None,
     clumping: float = 0.6,
+    roughness: float = 0.0,
 ) -> IceField:
-    """A random field of convex floes.
+    """A random field of floes, convex or with rough outlines.
 
     Sizes are drawn until their areas add up to what is wanted. Discs of most of those sizes
     are placed at random, more often where a smooth random field is high, until none
     touches another. The power diagram (Laguerre tessellation) of the discs gives each floe a cell
     of its own; a random convex shape grows within it to the floe's area. In open water a floe has
     a shape of its own, in a crowd its edges run along those of its neighbours, as in ice that
-    has broken. The concentration is exact to rounding.
+    has broken. From floes that are to be rough, a part is carved away in the end. The
+    concentration is exact to rounding.
 
     Args:
         rng: the only source of randomness.
@@ -56,6 +61,9 @@ def generate_ice(
             the mean radius.
         clumping: 0 for floes that are as likely everywhere, 1 for dense patches and open water.
             The denser the ice, the less space there is for it.
+        roughness: 0 for convex floes; else the fraction, at most 0.4, of a convex floe that is
+            carved away for a rough outline and bays (`pushplan.scenarios.rough_floes`). Real ones
+            look like 0.2.
 
     Raises:
         InvalidInputError: if a value is out of range.
@@ -67,7 +75,8 @@ def generate_ice(
     box = checked_bounds("ice bounds", bounds)
     concentration = number("ice concentration", concentration, low=0.0, high=1.0)
     clumping = number("ice clumping", clumping, low=0.0, high=1.0)
-    gap = 0.03 * sizes.mean_radius if gap is None else gap
+    roughness = number("ice roughness", roughness, low=0.0, high=MOST_ROUGHNESS)
+    gap = 0.03 * sizes.typical_radius if gap is None else gap
     gap = number("ice gap", gap, low=0.0, high=sizes.least, open_low=True)
     blocks = flatten(convex_outlines("keep_off", keep_off))
     water = core.IceWater(box, *blocks, gap)
@@ -75,7 +84,9 @@ def generate_ice(
     if wanted == 0.0:
         return IceField((), box)
     _check_possible(wanted, concentration, sizes, box)
-    return _pack(rng, wanted, sizes, box, water, clumping)
+    floes = _pack(rng, wanted, sizes, box, water, clumping, roughness)
+    reached = sum(geometry.polygon_area(piece) for parts in floes for piece in disjoint(parts))
+    return IceField(_shrunk(floes, wanted / reached), box)
 
 
 def _pack(
@@ -85,8 +96,9 @@ def _pack(
     box: FloatArray,
     water: core.IceWater,
     clumping: float,
-) -> IceField:
-    """Floes of a total area [m²]: with large discs first, then with smaller ones."""
+    roughness: float,
+) -> list[ConvexParts]:
+    """Floes of about a total area [m²], from large discs first, then from smaller ones."""
     concentration = wanted / float(np.prod(box[2:] - box[:2]))
     areas = sizes.draw(rng, wanted)
     if abs(areas.sum() - wanted) > 0.01 * wanted:
@@ -94,7 +106,14 @@ def _pack(
             f"a concentration of {concentration:.4g} is {wanted:.3g} m² of ice, which floes of "
             f"{sizes.least:g} to {sizes.greatest:g} m radius cannot add up to"
         )
-    density = _density(rng, box, sizes.mean_radius, clumping)
+    # areas of convex floes over those of what carving, and cutting into parts, leaves of them
+    whole = 1.0
+    if roughness > 0.0:
+        whole /= (1.0 - roughness) * (1.0 - MOST_CHANGE)
+    areas *= whole
+    least = np.pi * sizes.least**2 * (1.0 + MARGIN) * whole
+    greatest = np.pi * sizes.greatest**2 * whole
+    density = _density(rng, box, sizes.typical_radius, clumping)
     best = 0.0
     for fraction in _CORES:
         draws = rng.random((len(areas), _DRAWS, 3))
@@ -103,11 +122,14 @@ def _pack(
         if len(centres) < len(areas):
             continue
         shapes = _random_shapes(rng, len(areas))
-        floes = _grow(areas, wanted, sizes, *shapes, centres, radii, water)
-        reached = sum(geometry.polygon_area(floe) for floe in floes)
-        if reached >= wanted:
-            return IceField(tuple((floe,) for floe in _shrunk(floes, wanted / reached)), box)
-        best = max(best, reached)
+        floes = _grow(areas, whole * wanted, (least, greatest), *shapes, centres, radii, water)
+        reached = sum(geometry.polygon_area(floe) for floe in floes) / whole
+        if reached < wanted:
+            best = max(best, reached)
+        elif roughness > 0.0:
+            return roughened(rng, floes, roughness, sizes.typical_radius)
+        else:
+            return [(floe,) for floe in floes]
     reached_words = ""
     if best:
         reached_words = f": {concentration * best / wanted:.3g} was reached"
@@ -132,7 +154,7 @@ def _check_possible(wanted: float, concentration: float, sizes: FloeSizes, box: 
             f"floes of up to {sizes.greatest:g} m radius do not fit on water that is {side:g} m "
             "wide"
         )
-    if wanted > MOST_FLOES * np.pi * sizes.mean_radius**2:
+    if wanted > MOST_FLOES * np.pi * sizes.typical_radius**2:
         raise ScenarioError(
             f"this would be more than {MOST_FLOES} floes: ask for larger floes or less water"
         )
@@ -187,7 +209,7 @@ def _random_shapes(rng: np.random.Generator, count: int) -> tuple[FloatArray, In
 def _grow(
     areas: FloatArray,
     wanted: float,
-    sizes: FloeSizes,
+    limits: tuple[float, float],  # least and greatest area of a floe [m²]
     shapes: FloatArray,  # from `_random_shapes`, as the next one
     corner_counts: IntArray,
     centres: FloatArray,
@@ -199,8 +221,7 @@ def _grow(
     reaches = 1.15 * _STRETCH * furthest * np.sqrt(areas)
     cells = core.cut_cells(centres, radii, reaches, *_neighbours(centres, reaches), water)
     targets = (1.0 + MARGIN) * areas
-    least = np.pi * sizes.least**2 * (1.0 + MARGIN)
-    greatest = np.pi * sizes.greatest**2
+    least, greatest = limits
     for _ in range(_ROUNDS):
         corners, counts = core.fit_floes(shapes, corner_counts, centres, *cells, targets, _STRETCH)
         grown = [corners[k, :n] for k, n in enumerate(counts.tolist()) if n]
@@ -229,10 +250,12 @@ def _neighbours(centres: FloatArray, reaches: FloatArray) -> tuple[IntArray, Int
     return np.ascontiguousarray(both[:, 1]).astype(np.int64), offsets.astype(np.int64)
 
 
-def _shrunk(floes: list[FloatArray], fraction: float) -> tuple[FloatArray, ...]:
+def _shrunk(floes: list[ConvexParts], fraction: float) -> tuple[ConvexParts, ...]:
     """Floes drawn in about a point inside, so that this fraction of their area is left."""
-    vertices, offsets = flatten(floes)
+    vertices, offsets = flatten([np.concatenate(parts) for parts in floes])
     counts = np.diff(offsets)
     middles = np.add.reduceat(vertices, offsets[:-1]) / counts[:, None]
     middles = np.repeat(middles, counts, axis=0)
-    return unflatten(middles + np.sqrt(fraction) * (vertices - middles), offsets)
+    smaller = middles + np.sqrt(fraction) * (vertices - middles)
+    outlines = iter(unflatten(smaller, flatten([part for parts in floes for part in parts])[1]))
+    return tuple(tuple(next(outlines) for _ in parts) for parts in floes)

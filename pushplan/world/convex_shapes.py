@@ -35,19 +35,21 @@ def shapes_of(
         InvalidInputError: as `pushplan.world.outline_repair.outline_parts`.
     """
     try:  # nearly always
-        single = [_unpacked(shape) for shape in listed(name, shapes)]
-        return [(outline,) for outline in convex_outlines(name, single)]
+        parts = [_as_parts(shape) for shape in listed(name, shapes)]
+        outlines = iter(convex_outlines(name, [part for each in parts for part in each]))
+        return [tuple(next(outlines) for _ in each) for each in parts]
     except InvalidInputError:
         from pushplan.world.outline_repair import cut_outlines
 
         return cut_outlines(name, shapes, called or (lambda i: f"{name} {i}"))
 
 
-def _unpacked(shape: Any) -> Any:
-    """The outline in a tuple of one."""
-    if isinstance(shape, tuple) and len(shape) == 1:
-        return shape[0]
-    return shape
+def _as_parts(shape: Any) -> tuple[Any, ...]:
+    """The outlines of a shape that is given by its parts, or by one outline."""
+    several = isinstance(shape, tuple | list) and len(shape) > 0
+    if several and all(getattr(part, "ndim", 0) == 2 for part in shape):
+        return tuple(shape)
+    return (shape,)
 
 
 def hull_of(parts: ConvexParts) -> FloatArray:

@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import shapely
 
+from pushplan.core import geometry
 from pushplan.errors import InvalidInputError
-from pushplan.world.checks import FloatArray, array
+from pushplan.world.checks import FloatArray, array, frozen
 from pushplan.world.outline import (
     LARGEST_M,
     ConvexParts,
     convex_hull,
     convex_outline,
-    counter_clockwise,
+    convex_outlines,
     flatten,
     listed,
+    signed_area,
     well_formed,
 )
 
@@ -160,7 +162,11 @@ def _is_list_of_outlines(shape: Any) -> bool:
 def disjoint_pieces(parts: ConvexParts) -> ConvexParts:
     """Triangles (3, 2) [m] that do not overlap, with the union of some convex parts (N, 2) [m]."""
     union = shapely.union_all([shapely.Polygon(part) for part in parts])
-    return tuple(counter_clockwise(triangle) for triangle in _triangles(_areal(union)))
+    triangles = np.array(_triangles(_areal(union)))
+    along, across = np.moveaxis(triangles[:, 1:] - triangles[:, :1], 1, 0)
+    clockwise = along[:, 0] * across[:, 1] < along[:, 1] * across[:, 0]
+    triangles[clockwise] = triangles[clockwise, ::-1]
+    return tuple(frozen(triangles))
 
 
 def union_rings(parts: ConvexParts) -> tuple[FloatArray, ...]:
@@ -227,52 +233,17 @@ def _smoothed(whole: Any, size: float) -> Any:
 
 def _triangles(shape: Any) -> list[FloatArray]:
     pieces = shapely.get_parts(shapely.constrained_delaunay_triangles(shape))
-    return [shapely.get_coordinates(piece)[:3] for piece in pieces]
+    return list(shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3])
 
 
 def _merged(pieces: list[FloatArray], budget: float) -> list[FloatArray]:
-    """Few convex outlines whose union is that of convex pieces, up to an area `budget` [m²].
-
-    Neighbours are replaced by their hull, the pair first whose hull has the least area beyond
-    theirs: those that fit without a dent, as Hertel and Mehlhorn do, then those with a small one.
-    """
-    parts = dict(enumerate(pieces))
-    areas = {i: shapely.Polygon(piece).area for i, piece in parts.items()}
-    neighbours = _neighbours(pieces)
-    gains: dict[tuple[int, int], float] = {}  # area beyond theirs of the hull of two neighbours
-
-    def offer(pairs: Iterable[tuple[int, int]]) -> None:
-        for i, j in pairs:
-            hull = convex_hull(np.concatenate([parts[i], parts[j]]))
-            gains[i, j] = shapely.Polygon(hull).area - areas[i] - areas[j]
-
-    offer((i, j) for i in parts for j in neighbours[i] if i < j)
-    while gains:
-        i, j = min(gains, key=lambda pair: (gains[pair], pair))
-        if gains[i, j] > budget:
-            break
-        budget -= max(gains[i, j], 0.0)
-        new = len(areas)
-        parts[new] = convex_hull(np.concatenate([parts.pop(i), parts.pop(j)]))
-        areas[new] = shapely.Polygon(parts[new]).area
-        neighbours[new] = {k for k in neighbours[i] | neighbours[j] if k in parts}
-        gains = {pair: gain for pair, gain in gains.items() if not {i, j} & set(pair)}
-        for k in neighbours[new]:
-            neighbours[k].add(new)
-        offer((k, new) for k in sorted(neighbours[new]))
-    least = _SLIVER * sum(areas[i] for i in parts)
-    return [convex_outline("part", parts[i]) for i in parts if areas[i] > least]
-
-
-def _neighbours(pieces: list[FloatArray]) -> dict[int, set[int]]:
-    """The pieces that share an edge with each piece."""
-    owners: dict[frozenset[bytes], list[int]] = {}
-    for i, piece in enumerate(pieces):
-        corners = [corner.tobytes() for corner in piece + 0.0]
-        for a, b in zip(corners, corners[1:] + corners[:1], strict=True):
-            owners.setdefault(frozenset((a, b)), []).append(i)
-    found: dict[int, set[int]] = {i: set() for i in range(len(pieces))}
-    for sharing in owners.values():
-        for i in sharing:
-            found[i].update(j for j in sharing if j != i)
-    return found
+    """Few convex outlines whose union is that of convex pieces, up to an area `budget` [m²]."""
+    owners = geometry.merge_pieces(*flatten(pieces), budget)
+    parts = [
+        convex_hull(np.concatenate([pieces[i] for i in np.flatnonzero(owners == k)]))
+        for k in range(owners.max() + 1)
+    ]
+    areas = [signed_area(part) for part in parts]
+    least = _SLIVER * sum(areas)
+    kept = [part for part, area in zip(parts, areas, strict=True) if area > least]
+    return convex_outlines("part", kept)

@@ -154,6 +154,19 @@ def test_variations():
     assert 55.0 < floes[:, 1].max() < 60.0
 
 
+@pytest.mark.parametrize("preset", PRESETS)
+def test_floes_after_real_fields(preset):
+    ship = task(preset, concentration=0.05, floes="real", start_x=6.0)
+    world = ship.start(stream(0, "layout"))
+    ice = world.movables
+    x0, y0, x1, y1 = ship.ice_bounds
+    assert ice.areas.sum() == pytest.approx(0.05 * (x1 - x0) * (y1 - y0), rel=1e-6)
+    assert ice.is_compound and np.sqrt(ice.areas.max() / ice.areas.min()) > 3.0
+    hull = shapely.Polygon(world.robot_outline_world()[0])
+    assert all(floe.distance(hull) > ship.preset.clearance for floe in floes(world))
+    assert ship.start(stream(0, "layout")).movables == ice
+
+
 @pytest.mark.parametrize(
     ("bad", "error", "text"),
     [
@@ -172,6 +185,8 @@ def test_variations():
         ({"ice_file": 3}, ScenarioError, "ice_file"),
         ({"ice_file": "no/such/file.json"}, ScenarioError, r"cannot read ice field no/such/file"),
         ({"ice_file": "x.json", "concentration": 0.1}, ScenarioError, "exclude each other"),
+        ({"ice_file": "x.json", "floes": "real"}, ScenarioError, "floes and ice_file exclude"),
+        ({"floes": "round"}, ScenarioError, "convex"),
     ],
 )
 def test_bad_variations_are_refused(bad, error, text):

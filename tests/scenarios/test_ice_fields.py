@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from pushplan.core import scenarios as core
 from pushplan.scenarios import FloeSizes, generate_ice
+from pushplan.scenarios.rough_floes import roughened
 from pushplan.world import InvalidInputError, ScenarioError, stream
 from pushplan.world.outline import convex_outline
 
@@ -34,9 +35,14 @@ def shapes(field):
     return np.array([shapely.Polygon(corners) for (corners,) in field.floes], dtype=object)
 
 
-def least_gap(field):
-    """Least distance between two floes [m], by brute force over near pairs."""
-    found = shapes(field)
+def unions(field):
+    return np.array(
+        [shapely.union_all([shapely.Polygon(part) for part in parts]) for parts in field.floes]
+    )
+
+
+def least_gap(found):
+    """Least distance between two of some floes [m], by brute force over near pairs."""
     first, second = shapely.STRtree(found).query(found, predicate="dwithin", distance=0.1)
     pairs = first < second
     if not pairs.any():
@@ -52,7 +58,7 @@ def test_concentration_is_exact_and_nothing_overlaps(concentration):
         area = shapely.area(shapely.union_all(shapes(field)))
         assert area == pytest.approx(concentration * 480.0, rel=1e-9)
         assert field.concentration == pytest.approx(concentration, rel=1e-9)
-        assert least_gap(field) > 0.0098  # 3 % of the mean radius
+        assert least_gap(shapes(field)) > 0.0098  # 3 % of the mean radius
         for k, (corners,) in enumerate(field.floes):
             convex_outline(f"floe {k}", corners)
             assert (corners >= 0.0).all() and (corners <= (12.0, 40.0)).all()
@@ -90,6 +96,48 @@ def test_low_concentrations_have_clumps_and_open_water():
     even, clumped = spread(0.0), spread(1.0)
     assert 0.3 < even < 1.2  # a Poisson process has 1, a lattice 0
     assert clumped > 1.8 * even
+
+
+@pytest.mark.parametrize("concentration", [0.1, 0.5])
+def test_rough_floes_are_concave_of_few_parts_and_overlap_nowhere(concentration):
+    sizes = FloeSizes(least=0.2, greatest=1.2, exponent=1.8)
+    options = {"bounds": (-3.0, 5.0, 3.0, 12.0), "sizes": sizes, "roughness": 0.2}
+    for seed in range(2):
+        field = ice(concentration, seed, **options)
+        found = unions(field)
+        assert shapely.area(shapely.union_all(found)) == pytest.approx(42.0 * concentration)
+        assert field.concentration == pytest.approx(concentration, rel=1e-9)
+        assert least_gap(found) > 0.03 * sizes.typical_radius * (1.0 - 1e-6)
+        assert shapely.box(-3.0, 5.0, 3.0, 12.0).contains(shapely.union_all(found))
+        assert all(floe.geom_type == "Polygon" for floe in found)
+        filled = shapely.area(found) / shapely.area(shapely.convex_hull(found))
+        assert np.mean(filled < 0.98) > 0.5 and filled.min() > 0.7
+        assert np.mean([len(parts) for parts in field.floes]) < 8.0
+        assert max(sum(map(len, parts)) for parts in field.floes) > 30
+        assert field.radii.min() > 0.99 * sizes.least and field.radii.max() < 1.01 * sizes.greatest
+        assert field == ice(concentration, seed, **options)
+
+
+def test_rough_floes_lie_within_the_convex_ones_that_they_are_carved_from():
+    angles = np.arange(8) * np.pi / 4.0
+    octagon = np.stack([2.0 * np.cos(angles), np.sin(angles)], axis=1) + 5.0
+    whole = shapely.Polygon(octagon)
+    for roughness in (0.05, 0.2, 0.4):
+        for parts in roughened(stream(0, "ice"), [octagon] * 10, roughness, 0.3):
+            left = shapely.union_all([shapely.Polygon(part) for part in parts])
+            assert whole.buffer(1e-9).contains(left)
+            assert left.area == pytest.approx((1.0 - roughness) * whole.area, rel=0.02)
+
+
+def test_sizes_follow_a_power_law():
+    sizes = FloeSizes(least=0.2, greatest=2.0, exponent=1.8)
+    radii = np.sqrt(sizes.draw(stream(0, "ice"), 3e3) / np.pi)
+    assert radii.min() >= 0.2 and radii.max() <= 2.0
+    assert radii.mean() == pytest.approx(sizes.typical_radius, rel=0.03)
+    above = [np.mean(radii > r) for r in (0.2, 0.4, 0.8)]
+    lost = 10.0**-1.8  # what is cut off above, of the number above the least
+    for k, share in enumerate(above):
+        assert share == pytest.approx((2.0 ** (-1.8 * k) - lost) / (1.0 - lost), abs=0.02)
 
 
 def test_no_ice_and_little_ice():
@@ -138,6 +186,8 @@ def test_what_cannot_be_packed_is_one_error():
         {"keep_off": [[[0.0, 0.0], [1.0, 1.0]]]},
         {"keep_off": 3},
         {"sizes": 0.3},
+        {"roughness": 0.5},
+        {"roughness": -0.1},
     ],
 )
 def test_bad_requests_are_refused(bad):
@@ -149,6 +199,8 @@ def test_bad_requests_are_refused(bad):
 def test_bad_sizes_are_refused(sizes):
     with pytest.raises(InvalidInputError):
         FloeSizes(*sizes)
+    with pytest.raises(InvalidInputError, match=r"least < greatest, got 0\.6, 0\.2 m"):
+        FloeSizes(least=0.6, greatest=0.2, exponent=2.0)
 
 
 def test_the_same_seed_gives_the_same_bytes_in_every_process():
@@ -171,7 +223,7 @@ def test_full_scale_and_speed():
     field = ice(0.5, **FULL_SCALE)
     assert field.concentration == pytest.approx(0.5, rel=1e-9)
     assert field.radii.min() >= 6.0 and field.radii.max() <= 25.0
-    assert 150 < len(field) < 250 and least_gap(field) > 0.3
+    assert 150 < len(field) < 250 and least_gap(shapes(field)) > 0.3
     assert quickest(lambda: ice(0.5)) < 0.2
 
 
@@ -245,4 +297,4 @@ def test_cells_and_floes_agree_with_shapely():
 def test_any_field_is_exact_and_free_of_overlap(concentration, width, length, x, clumping, seed):
     field = ice(concentration, seed, bounds=(x, -x, x + width, length - x), clumping=clumping)
     assert field.concentration == pytest.approx(concentration, rel=1e-6)
-    assert least_gap(field) > 0.009
+    assert least_gap(shapes(field)) > 0.009

@@ -17,11 +17,19 @@ IceContacts::IceContacts(const IceBodies& bodies, const IceSettings& settings)
   moves_.resize(bodies.radii.size());
   state_.resize(bodies.radii.size());
   points_.reserve(most_points_);
+  if (bodies.floes.parts.count() > bodies.floes.count()) {
+    boxes_.resize(at(bodies.floes.parts.count()));
+    hull_boxes_.resize(at(bodies.hull.count()));
+  }
 }
 
 void IceContacts::place(Index k, const Pose& pose) {
   const auto [first, count] = bodies_.floes.corners(k);
   transform(pose, bodies_.floes.parts.vertices.subspan(first, count), corners_.data() + first);
+  if (boxes_.empty()) return;
+  for (Index p = bodies_.floes.begin(k); p < bodies_.floes.end(k); ++p) {
+    boxes_[at(p)] = box_around(part(p));
+  }
 }
 
 void IceContacts::place(std::span<const Pose> poses) {
@@ -52,6 +60,20 @@ void IceContacts::add(Index a, Index b, const Contacts& found, Vec2 centre_a,
   }
 }
 
+/// Adds the contacts of a part of a body with a floe. Returns true if there are any.
+bool IceContacts::meet(Index a, Polygon piece, const Box* box, Index b, Vec2 centre_a,
+                       std::span<const Pose> poses) {
+  bool met = false;
+  for (Index q = bodies_.floes.begin(b); q < bodies_.floes.end(b); ++q) {
+    if (box != nullptr && box->apart(boxes_[at(q)], settings_.step)) continue;
+    const Contacts found = near_contacts(piece, part(q), settings_.step);
+    if (found.count == 0) continue;
+    add(a, b, found, centre_a, poses);
+    met = true;
+  }
+  return met;
+}
+
 /// Adds the contacts of a floe that has begun to move with all that are near and not yet met.
 void IceContacts::meet_neighbours(Index k, std::span<const Pose> poses) {
   state_[at(k)] = State::kNeighboursKnown;
@@ -64,11 +86,9 @@ void IceContacts::meet_neighbours(Index k, std::span<const Pose> poses) {
     if (dx * dx + dy * dy >= reach * reach) continue;
     const Index other = static_cast<Index>(j);
     for (Index p = bodies_.floes.begin(k); p < bodies_.floes.end(k); ++p) {
-      for (Index q = bodies_.floes.begin(other); q < bodies_.floes.end(other); ++q) {
-        const Contacts found = near_contacts(part(p), part(q), settings_.step);
-        if (found.count == 0) continue;
-        add(k, other, found, centre, poses);
-        if (state_[j] == State::kResting) state_[j] = State::kTouched;
+      const Box* box = boxes_.empty() ? nullptr : &boxes_[at(p)];
+      if (meet(k, part(p), box, other, centre, poses) && state_[j] == State::kResting) {
+        state_[j] = State::kTouched;
       }
     }
   }
@@ -80,6 +100,9 @@ void IceContacts::meet_hull(const Pose& here, std::span<const Pose> poses) {
   std::fill(state_.begin(), state_.end(), State::kResting);
   points_.clear();
   const Polygons pieces{hull_, bodies_.hull.offsets};
+  for (std::size_t i = 0; i < hull_boxes_.size(); ++i) {
+    hull_boxes_[i] = box_around(pieces[static_cast<Index>(i)]);
+  }
   for (std::size_t k = 0; k < poses.size(); ++k) {
     const double dx = poses[k].x - here.x;
     const double dy = poses[k].y - here.y;
@@ -87,10 +110,8 @@ void IceContacts::meet_hull(const Pose& here, std::span<const Pose> poses) {
     if (dx * dx + dy * dy >= reach * reach) continue;
     const Index floe = static_cast<Index>(k);
     for (Index piece = 0; piece < pieces.count(); ++piece) {
-      for (Index p = bodies_.floes.begin(floe); p < bodies_.floes.end(floe); ++p) {
-        const Contacts found = near_contacts(pieces[piece], part(p), settings_.step);
-        if (found.count == 0) continue;
-        add(kHull, floe, found, {here.x, here.y}, poses);
+      const Box* box = boxes_.empty() ? nullptr : &hull_boxes_[at(piece)];
+      if (meet(kHull, pieces[piece], box, floe, {here.x, here.y}, poses)) {
         state_[k] = State::kTouched;
       }
     }
@@ -106,7 +127,9 @@ void IceContacts::relax(const Pose& hull_move) {
     const double rx = move_b.x - move_b.theta * p.arm_b.y - move_a.x + move_a.theta * p.arm_a.y;
     const double ry = move_b.y + move_b.theta * p.arm_b.x - move_a.y - move_a.theta * p.arm_a.x;
     const double pushed = p.push;
-    p.push = std::max(0.0, pushed - (rx * n.x + ry * n.y + p.gap) / p.along);
+    const double gap = rx * n.x + ry * n.y + p.gap;  // after the displacements so far
+    if (pushed == 0.0 && gap >= 0.0) continue;       // nor does it drag; most are so
+    p.push = std::max(0.0, pushed - gap / p.along);
     const double limit = (p.a == kHull ? settings_.hull_friction : settings_.friction) * p.push;
     const double dragged = p.drag;
     p.drag = std::min(std::max(dragged - (ry * n.x - rx * n.y) / p.across, -limit), limit);

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -22,7 +22,7 @@ from pushplan.world import (
     StaticMap,
     World,
 )
-from pushplan.world.checked_fields import Fraction, Limits, PositiveFloat
+from pushplan.world.checked_fields import Fraction, Limits, OneOf, PositiveFloat
 from pushplan.world.checks import FloatArray
 from pushplan.world.outline import transform
 
@@ -31,6 +31,9 @@ CONCENTRATION = 0.1
 _IMAGE_CHANNELS = ("footprint", "movable", "goal_distance", "heading_line")
 _PIXELS = 150
 _START_TRIES = 500
+_REAL_ROUGHNESS = 0.2
+_REAL_EXPONENT = 1.8  # of sizes, as Rothrock and Thorndike (1984) found for floes from 0.1 km
+_REAL_GREATEST = 2.0  # radius, over that of convex floes
 _UP = 0.5 * math.pi
 
 
@@ -47,6 +50,8 @@ class ShipIceVariations(TaskVariations):
     concentration: Annotated[float, Limits(0.0, 0.5)] | None = None
     # 0 for ice that is equally likely everywhere, 1 for patches and open water
     clumping: Fraction = 0.6
+    # ``"convex"``, or after ``"real"`` fields: rough outlines, bays, sizes of a power law
+    floes: Annotated[str, OneOf(("convex", "real"))] = "convex"
     channel_length: PositiveFloat | None = None  # with ice to the same distance from its end [m]
     # distance of the goal line ahead of the start line [m]
     goal_distance: PositiveFloat | None = None
@@ -60,8 +65,11 @@ class ShipIceVariations(TaskVariations):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.concentration is not None and self.ice_file is not None:
-            raise InvalidInputError("concentration and ice_file exclude each other")
+        if self.ice_file is not None:
+            if self.concentration is not None:
+                raise InvalidInputError("concentration and ice_file exclude each other")
+            if self.floes != "convex":
+                raise InvalidInputError("floes and ice_file exclude each other")
 
 
 class ShipIceTask(Task):
@@ -173,14 +181,20 @@ class ShipIceTask(Task):
 
     def _random_ice(self, rng: np.random.Generator, pose: FloatArray) -> IceField:
         fraction = self.variations.concentration
+        sizes = FloeSizes(**self.preset.sizes)
+        real = self.variations.floes == "real"
+        if real:
+            greatest = _REAL_GREATEST * sizes.greatest
+            sizes = replace(sizes, greatest=greatest, exponent=_REAL_EXPONENT)
         around = np.asarray(self._berth(pose).exterior.coords)[:-1]
         return generate_ice(
             rng,
             bounds=self.ice_bounds,
             concentration=CONCENTRATION if fraction is None else fraction,
-            sizes=FloeSizes(**self.preset.sizes),
+            sizes=sizes,
             keep_off=[around],
             clumping=self.variations.clumping,
+            roughness=_REAL_ROUGHNESS if real else 0.0,
         )
 
     def _free_pose(self, rng: np.random.Generator, field: IceField) -> FloatArray:

@@ -1,6 +1,7 @@
 // Points, poses and outlines in the plane. Lengths in m, angles in rad.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <span>
@@ -44,6 +45,11 @@ struct Box {
     return x_min - margin <= p.x && p.x <= x_max + margin && y_min - margin <= p.y &&
            p.y <= y_max + margin;
   }
+  /// True if it is more than a margin away from another one along an axis.
+  bool apart(const Box& other, double margin) const {
+    return other.x_min - x_max > margin || x_min - other.x_max > margin ||
+           other.y_min - y_max > margin || y_min - other.y_max > margin;
+  }
 };
 
 /// Corners of a convex polygon, counter-clockwise.
@@ -52,6 +58,16 @@ using Polygon = std::span<const Vec2>;
 /// The number of the corner after corner `i`.
 inline std::size_t next_corner(Polygon polygon, std::size_t i) {
   return i + 1 < polygon.size() ? i + 1 : 0;
+}
+
+/// The box around a polygon.
+inline Box box_around(Polygon polygon) {
+  Box box{polygon[0].x, polygon[0].y, polygon[0].x, polygon[0].y};
+  for (const Vec2 p : polygon) {
+    box = {std::min(box.x_min, p.x), std::min(box.y_min, p.y), std::max(box.x_max, p.x),
+           std::max(box.y_max, p.y)};
+  }
+  return box;
 }
 
 /// Polygons one after the other: number i has the vertices `offsets[i]` to `offsets[i + 1] - 1`.

@@ -79,15 +79,19 @@ class IceContacts {
   double advance(const Pose& here, const Pose& by, std::span<Pose> poses);
   void meet_hull(const Pose& here, std::span<const Pose> poses);
   void meet_neighbours(Index k, std::span<const Pose> poses);
+  bool meet(Index a, Polygon piece, const Box* box, Index b, Vec2 centre_a,
+            std::span<const Pose> poses);
   void add(Index a, Index b, const Contacts& found, Vec2 centre_a, std::span<const Pose> poses);
   void relax(const Pose& hull_move);
   Polygon part(Index p) const { return Polygons{corners_, bodies_.floes.parts.offsets}[p]; }
 
   IceBodies bodies_;
   IceSettings settings_;
-  std::vector<Vec2> hull_;     // corners in the world frame
-  std::vector<Vec2> corners_;  // of the floes' parts, kept up to date
-  std::vector<Pose> moves_;    // displacement of each floe in this step
+  std::vector<Vec2> hull_;       // corners in the world frame
+  std::vector<Vec2> corners_;    // of the floes' parts, kept up to date
+  std::vector<Box> boxes_;       // around the parts, and around those of the hull: only where there
+  std::vector<Box> hull_boxes_;  // are floes of several parts
+  std::vector<Pose> moves_;      // displacement of each floe in this step
   std::vector<State> state_;
   std::vector<ContactPoint> points_;
   std::size_t most_points_;  // more are left out

@@ -1,0 +1,132 @@
+#include "pushplan/geometry/convex_parts.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <map>
+#include <set>
+#include <tuple>
+#include <utility>
+
+#include "pushplan/geometry/polygon.hpp"
+
+namespace pushplan {
+namespace {
+
+constexpr double kRounding = 1e-12;  // fraction of the area of all pieces that counts as none
+
+std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+
+struct Part {
+  std::vector<Vec2> corners;
+  double area;  // of its pieces, and of what mergers have added [m^2]
+  std::set<Index> neighbours;
+};
+
+struct Merger {
+  double gain;  // area of the hull beyond those of the two [m^2]
+  Index first;
+  Index second;
+
+  bool operator<(const Merger& other) const {
+    return std::tuple(gain, first, second) < std::tuple(other.gain, other.first, other.second);
+  }
+};
+
+/// Corners of the convex hull of two sets of points, by Andrew's monotone chain.
+std::vector<Vec2> hull_of(std::vector<Vec2> points, const std::vector<Vec2>& others) {
+  points.insert(points.end(), others.begin(), others.end());
+  std::ranges::sort(points, {}, [](Vec2 p) { return std::pair(p.x, p.y); });
+  std::vector<Vec2> hull;
+  const auto add = [&](Vec2 p, std::size_t least) {
+    while (hull.size() > least) {
+      const Vec2 a = hull[hull.size() - 2];
+      const Vec2 b = hull.back();
+      if ((b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x) > 0.0) break;
+      hull.pop_back();
+    }
+    hull.push_back(p);
+  };
+  for (const Vec2 p : points) add(p, 1);
+  const std::size_t lower = hull.size();
+  for (std::size_t i = points.size() - 1; i-- > 0;) add(points[i], lower);
+  hull.pop_back();
+  return hull;
+}
+
+/// The pieces, each with the numbers of those that share an edge with it.
+std::vector<Part> with_neighbours(const Polygons& pieces) {
+  std::vector<Part> parts;
+  std::map<std::array<double, 4>, std::vector<Index>> owners;
+  for (Index i = 0; i < pieces.count(); ++i) {
+    const Polygon piece = pieces[i];
+    parts.push_back({{piece.begin(), piece.end()}, std::abs(polygon_area(piece)), {}});
+    for (std::size_t k = 0; k < piece.size(); ++k) {
+      Vec2 a = piece[k];
+      Vec2 b = piece[next_corner(piece, k)];
+      if (std::pair(b.x, b.y) < std::pair(a.x, a.y)) std::swap(a, b);
+      owners[{a.x, a.y, b.x, b.y}].push_back(i);
+    }
+  }
+  for (const auto& [edge, sharing] : owners) {
+    for (const Index i : sharing) {
+      for (const Index j : sharing) {
+        if (i != j) parts[at(i)].neighbours.insert(j);
+      }
+    }
+  }
+  return parts;
+}
+
+}  // namespace
+
+std::vector<Index> merge_pieces(const Polygons& pieces, double budget) {
+  std::vector<Part> parts = with_neighbours(pieces);
+  std::vector<Index> owners(parts.size());
+  double total = 0.0;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    owners[i] = static_cast<Index>(i);
+    total += parts[i].area;
+  }
+  std::set<Merger> mergers;
+  const auto offer = [&](Index i, Index j) {
+    const Part& a = parts[at(i)];
+    const Part& b = parts[at(j)];
+    const double gain = polygon_area(hull_of(a.corners, b.corners)) - a.area - b.area;
+    mergers.insert({gain < kRounding * total ? 0.0 : gain, i, j});
+  };
+  for (Index i = 0; i < pieces.count(); ++i) {
+    for (const Index j : parts[at(i)].neighbours) {
+      if (i < j) offer(i, j);
+    }
+  }
+  while (!mergers.empty() && mergers.begin()->gain <= budget) {
+    const auto [gain, first, second] = *mergers.begin();
+    budget -= gain;
+    std::erase_if(mergers, [first, second](const Merger& each) {
+      return each.first == first || each.first == second || each.second == first ||
+             each.second == second;
+    });
+    const auto merged = static_cast<Index>(parts.size());
+    Part part{hull_of(parts[at(first)].corners, parts[at(second)].corners), 0.0, {}};
+    part.area = parts[at(first)].area + parts[at(second)].area + gain;
+    for (const Index i : {first, second}) {
+      for (const Index k : parts[at(i)].neighbours) {
+        parts[at(k)].neighbours.erase(i);
+        if (k == first || k == second) continue;
+        part.neighbours.insert(k);
+        parts[at(k)].neighbours.insert(merged);
+      }
+    }
+    parts.push_back(std::move(part));
+    for (const Index k : parts.back().neighbours) offer(k, merged);
+    std::ranges::replace(owners, first, merged);
+    std::ranges::replace(owners, second, merged);
+  }
+  const std::set<Index> left(owners.begin(), owners.end());
+  for (Index& owner : owners) owner = std::distance(left.begin(), left.find(owner));
+  return owners;
+}
+
+}  // namespace pushplan
