@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from pushplan.core import geometry as core
 from pushplan.world import InvalidInputError, Movables
 from pushplan.world.checks import FloatArray, array
+from pushplan.world.outline import unflatten
 
 
 def corners(name: str, polygon: ArrayLike) -> FloatArray:
@@ -43,8 +44,10 @@ def gyration_squares(movables: Movables) -> FloatArray:
     The square of the radius of its limit surface: as given, or that of its area as drawn.
     """
     squares = movables.gyration_radii**2
+    outlines = unflatten(movables.drawn_vertices, movables.drawn_offsets)
     for k in np.flatnonzero(movables.gyration_radii == 0.0).tolist():
-        squares[k] = _second_moment(movables.pieces(k))
+        pieces = movables.pieces(k) if movables.is_compound else outlines[k : k + 1]
+        squares[k] = _second_moment(pieces)
     return squares
 
 

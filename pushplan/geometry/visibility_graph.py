@@ -18,7 +18,7 @@ from pushplan.geometry.shortest_path import Path, ends_on_rims, leave_inflation,
 from pushplan.world import Goal, StaticMap
 from pushplan.world.checks import FloatArray, IntArray, array, expect, number
 
-MANY_CORNERS = 10_000
+MANY_CORNERS = 40_000
 """Corners of a map from which on a path that is nearly the shortest is good enough."""
 _BUDGET = 20_000  # work of a search between two looks at a stop rule: about a millisecond
 

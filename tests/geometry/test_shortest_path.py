@@ -398,3 +398,26 @@ def test_a_search_among_ten_thousand_walls_can_be_stopped() -> None:
     )
     assert math.isinf(path.length) and len(looks) == 40
     assert np.median(np.diff(looks)) < 0.1  # a whole graph takes minutes
+
+
+def test_the_way_out_of_a_crowded_dead_end_is_found_soon(monkeypatch: pytest.MonkeyPatch) -> None:
+    square = np.array([[0.0, 0.0], [0.5, 0.0], [0.5, 0.5], [0.0, 0.5]])
+    wall = [square + np.array([10.0, 0.5 * i]) for i in range(40)]  # but the goal is behind it
+    posts = [0.5 * square + 1.2 * np.array([i, j]) for i in range(1, 8) for j in range(2, 16)]
+    static = StaticMap.build(wall + posts, bounds=[0, -2, 14, 20])
+    goal = GoalDisc((13.0, 18.0), 0.2)
+    looks: list[None] = []
+
+    def stopped() -> bool:
+        looks.append(None)
+        return False
+
+    found = []
+    for corners in (1_000_000, 1000):
+        monkeypatch.setattr("pushplan.geometry.visibility_graph.MANY_CORNERS", corners)
+        looks.clear()
+        path = VisibilityGraph(static, 0.2).to_goal((9.2, 18.0), goal, stopped)
+        found.append((path.length, len(looks)))
+    (shortest, slow), (length, quick) = found
+    assert shortest <= length <= 1.05 * shortest
+    assert 5 * quick < slow, (quick, slow)

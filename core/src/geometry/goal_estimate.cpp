@@ -53,8 +53,8 @@ void narrow(std::span<const Vec2> outline, double first, std::span<Chord> chords
 
 /// Marks the sides along lines of constant `y` that an outline covers, with a margin around them.
 /// Lengths are cells; side i of a line goes from i to i + 1, and `sides` has `across` for each line
-/// and `along` between them.
-void cover(std::span<const Vec2> outline, Index lines, Index count, Index along, Index across,
+/// and `along` between them. No path goes below 0 or beyond `extent` along a line.
+void cover(std::span<const Vec2> outline, Index lines, double extent, Index along, Index across,
            std::vector<char>& sides) {
   double low = kInfinity;
   double high = -kInfinity;
@@ -64,14 +64,18 @@ void cover(std::span<const Vec2> outline, Index lines, Index count, Index along,
   }
   const Index first = std::max(Index{0}, ceil_index(low + kMargin));
   const Index last = std::min(lines - 1, floor_index(high - kMargin));
+  const Index count = floor_index(extent) + 1;
   if (first > last) return;
   std::vector<Chord> chords(at(last - first + 1), Chord{-kInfinity, kInfinity});
   narrow(outline, static_cast<double>(first) - kMargin, chords);
   narrow(outline, static_cast<double>(first) + kMargin, chords);
   for (Index line = first; line <= last; ++line) {
     const Chord& chord = chords[at(line - first)];
-    const Index begin = std::max(Index{0}, ceil_index(chord.left + kMargin));
-    const Index end = std::min(count, floor_index(chord.right - kMargin));
+    if (!(chord.left <= chord.right)) continue;
+    const Index begin =
+        chord.left <= 0.0 ? 0 : std::max(Index{0}, ceil_index(chord.left + kMargin));
+    const Index end =
+        chord.right >= extent ? count : std::min(count, floor_index(chord.right - kMargin));
     for (Index i = begin; i < end; ++i) sides[at(line * across + i * along)] = 1;
   }
 }
@@ -107,9 +111,9 @@ CoveredSides::CoveredSides(Polygons outlines, const Box& box, double cell) {
   const double height = std::max(box.y_max - box.y_min, 0.0);
   cell_ = std::max({cell, std::sqrt(width / kMaxCells) * std::sqrt(height),
                     std::max(width, height) / kMaxCells, std::numeric_limits<double>::min()});
-  origin_ = {box.x_min - cell_, box.y_min - cell_};
-  columns_ = static_cast<Index>(width / cell_) + 3;
-  rows_ = static_cast<Index>(height / cell_) + 3;
+  origin_ = {box.x_min, box.y_min};
+  columns_ = floor_index(width / cell_) + 1;
+  rows_ = floor_index(height / cell_) + 1;
   left_.assign(at(rows_ * columns_), 0);
   below_.assign(at(rows_ * columns_), 0);
   std::vector<Vec2> corners;  // [cells]
@@ -119,9 +123,9 @@ CoveredSides::CoveredSides(Polygons outlines, const Box& box, double cell) {
     for (const Vec2 corner : outlines[k]) {
       corners.push_back({(corner.x - origin_.x) / cell_, (corner.y - origin_.y) / cell_});
     }
-    cover(corners, rows_, columns_, 1, columns_, below_);
+    cover(corners, rows_, width / cell_, 1, columns_, below_);
     for (Vec2& corner : corners) std::swap(corner.x, corner.y);
-    cover(corners, columns_, rows_, columns_, 1, left_);
+    cover(corners, columns_, height / cell_, columns_, 1, left_);
   }
 }
 

@@ -146,7 +146,9 @@ class PymunkBodies:
         here = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0)  # the transform that changes nothing
         radii = movables.contact_radii.tolist()
         given = movables.gyration_radii.tolist()
-        squares = gyration_squares(movables).tolist()
+        squares = given
+        if movables.is_compound or any(given):
+            squares = gyration_squares(movables).tolist()
         for k, mass in enumerate(movables.masses.tolist()):
             fixed = bool(movables.fixed[k])
             parts = [
