@@ -46,7 +46,9 @@ def gyration_squares(movables: Movables) -> FloatArray:
     squares = movables.gyration_radii**2
     outlines = unflatten(movables.drawn_vertices, movables.drawn_offsets)
     for k in np.flatnonzero(movables.gyration_radii == 0.0).tolist():
-        pieces = movables.pieces(k) if movables.is_compound else outlines[k : k + 1]
+        pieces = outlines[k : k + 1]
+        if movables.is_compound:
+            pieces = movables.pieces(k)
         squares[k] = _second_moment(pieces)
     return squares
 

@@ -38,9 +38,8 @@ def load_object(spec: str) -> Any:
         raise InvalidInputError(f"expected 'module:Name' or 'path/to/file.py:Name', got {spec!r}")
     if where.count(".") >= _DEEPEST:
         raise InvalidInputError(f"a module has at most {_DEEPEST} parts in its name, got {spec!r}")
-    ours = sys.modules.get(where) if where.startswith("pushplan.") else None
-    if ours is not None and hasattr(ours, name):  # nothing to import: each score is asked for so
-        return getattr(ours, name)
+    if where.startswith("pushplan.") and hasattr(sys.modules.get(where), name):
+        return getattr(sys.modules[where], name)  # nothing to import: each score is asked for so
     with _fresh_modules():
         if where.endswith(".py"):
             module = _load_file(Path(where))

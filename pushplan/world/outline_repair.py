@@ -131,7 +131,7 @@ def cut_outlines(
 
 
 def _convex_ones(outlines: list[Any]) -> list[bool]:
-    """Which outlines are arrays that need no repair: a quick look at all of them at once."""
+    """Find the outlines that are arrays and need no repair, at a quick look at all of them."""
     plain = [
         isinstance(one, np.ndarray)
         and one.dtype == np.float64
@@ -140,10 +140,9 @@ def _convex_ones(outlines: list[Any]) -> list[bool]:
         and len(one) >= 3
         for one in outlines
     ]
-    good = iter(
-        well_formed(*flatten([one for one, is_it in zip(outlines, plain, strict=True) if is_it]))
-    )
-    return [is_it and bool(next(good)) for is_it in plain]
+    good = np.array(plain, dtype=bool)
+    good[good] = well_formed(*flatten([outlines[i] for i in np.flatnonzero(good).tolist()]))
+    return [bool(one) for one in good]
 
 
 def _is_list_of_outlines(shape: Any) -> bool:
