@@ -121,13 +121,15 @@ def rewrite_asserts(config: pytest.Config) -> None:
     That takes most of the time of a first collection. It calls what pytest does not promise to
     keep: where that has changed, the workers do it as ever.
     """
-    named = [Path(one.partition("::")[0]) for one in config.args]
-    files = [file for one in named for file in ([one] if one.is_file() else one.rglob("test_*.py"))]
-    with contextlib.suppress(ImportError, AttributeError, TypeError, ValueError, OSError):
+    ours = Path(__file__).parent
+    named = {Path(one.partition("::")[0]).absolute() for one in config.args}
+    with contextlib.suppress(Exception):  # a file that is no Python, say: its worker reports it
         from _pytest.assertion import rewrite
 
         state = config.stash[rewrite.assertstate_key]
-        for file in map(Path.absolute, files):
+        for file in ours.rglob("test_*.py"):
+            if named.isdisjoint({file, *file.parents}):
+                continue
             folder = rewrite.get_cache_dir(file)
             cached = folder / f"{file.stem}{rewrite.PYC_TAIL}"
             if rewrite._read_pyc(file, cached) is None and rewrite.try_makedirs(folder):

@@ -458,9 +458,11 @@ class Caller:
             return tuple(self.valid(owner, part) for part in parts)
         if wanted.kind == "list":
             return [self.valid(owner, parameter("item", wanted.dtype)) for _ in range(2)]
-        if wanted.kind.startswith("object") or wanted.kind.endswith(" | None"):
+        if wanted.kind.startswith("object"):
             return None
-        return self.instance(wanted.kind)
+        if wanted.kind.endswith(" | None") and self.random.random() < 0.5:
+            return None
+        return self.instance(wanted.kind.removesuffix(" | None"))
 
     def array(self, wanted: Parameter, known: Any) -> np.ndarray:
         shape = [2 if extent is None else extent for extent in wanted.shape]

@@ -91,6 +91,7 @@ void bind_shapes(nb::module_& module) {
   module.def(
       "merge_pieces",
       [](const Points& vertices, const Integers<1>& offsets, double budget) {
+        for (const Vec2 corner : points(vertices)) require_finite("vertices", corner.x + corner.y);
         const std::vector<Index> owners = merge_pieces(polygons(vertices, offsets), budget);
         const auto numbers = zeros<Index, 1>({owners.size()});
         std::copy(owners.begin(), owners.end(), view(numbers).begin());
@@ -408,6 +409,7 @@ void bind_path_search(nb::module_& module) {
             const Box around = box(bounds);
             require_finite("box", around.x_max - around.x_min + (around.y_max - around.y_min));
             require_finite("cell", cell);
+            for (const Vec2 corner : corners.points) require_finite("corners", corner.x + corner.y);
             new (self) CoveredSides({corners.points.first(corners.owner.size()), corners.first},
                                     around, cell);
           },
@@ -442,10 +444,13 @@ void bind_path_search(nb::module_& module) {
           "estimate"_a = nb::none(), nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>(),
           nb::keep_alive<1, 5>(), nb::keep_alive<1, 7>(), ReleaseGil())
       .def("run", &VisibilitySearch::run, "budget"_a, ReleaseGil())
-      .def("path", [](VisibilitySearch& s) {
-        const std::vector<Index> nodes = s.path();
-        return copied(std::span<const Index>(nodes));
-      }, kOwned);
+      .def(
+          "path",
+          [](VisibilitySearch& s) {
+            const std::vector<Index> nodes = s.path();
+            return copied(std::span<const Index>(nodes));
+          },
+          kOwned);
 }
 
 void bind_shadows(nb::module_& module) {

@@ -212,7 +212,8 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         if layout is None:
             layout = int(self.np_random.integers(_SEED_LIMIT))
         world = self.task.start(stream(layout, "layout"))
-        world, materials = self.task.varied(world, stream(layout, "parameters"))
+        flat = not self._simulator.needs_solids
+        world, materials = self.task.varied(world, stream(layout, "parameters"), flat=flat)
         self._simulator.build(world, materials)
         self._world = world
         self._meanwhile = clamp_twist(world.robot, 0.0, 0.0)

@@ -38,8 +38,9 @@ def load_object(spec: str) -> Any:
         raise InvalidInputError(f"expected 'module:Name' or 'path/to/file.py:Name', got {spec!r}")
     if where.count(".") >= _DEEPEST:
         raise InvalidInputError(f"a module has at most {_DEEPEST} parts in its name, got {spec!r}")
-    if where.startswith("pushplan.") and hasattr(sys.modules.get(where), name):
-        return getattr(sys.modules[where], name)  # nothing to import: each score is asked for so
+    if where.startswith("pushplan.") and where in sys.modules:  # each score is asked for so
+        with contextlib.suppress(AttributeError):
+            return getattr(sys.modules[where], name)
     with _fresh_modules():
         if where.endswith(".py"):
             module = _load_file(Path(where))

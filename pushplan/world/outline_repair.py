@@ -112,7 +112,7 @@ def cut_outlines(
         parts: list[FloatArray] = []
         for label, outline in outlines:
             if next(convex):
-                parts.append(outline)
+                parts.append(frozen(outline.copy()))
                 continue
             cut = outline_parts(label, outline)
             parts += cut.parts

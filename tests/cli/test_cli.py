@@ -97,6 +97,7 @@ def test_list_says_what_each_policy_and_suite_is_for(capsys: pytest.CaptureFixtu
 def test_the_shell_completes_commands_and_kinds() -> None:
     pytest.importorskip("argcomplete")
     for line, words in (
+        ("pushplan li", ["list"]),
         ("pushplan list su", ["suites"]),
         ("pushplan run maze-2d-6", ["maze-2d-6", "maze-2d-6-z"]),
     ):

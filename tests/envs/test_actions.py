@@ -151,7 +151,6 @@ def test_places_take_no_velocities(name):
         mode(name).encode(Twist(0.1, 0.0))
 
 
-@pytest.mark.slow
 def test_a_robot_at_a_wall_makes_room_for_its_turn():
     """Random headings drive it into walls and corners; it never stands there for long."""
     env = PushEnv(task="box_delivery", observation="state", action="heading")

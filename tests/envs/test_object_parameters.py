@@ -179,3 +179,9 @@ def test_a_value_that_makes_no_sense_is_one_clear_error(task, name, bad):
 def test_a_wrong_name_is_one_error_too():
     with pytest.raises(UnknownNameError, match="did you mean 'mass_spread'"):
         environment("maze", mas_spread=2.0)
+
+
+def test_only_planar_simulators_have_limit_surfaces_to_draw():
+    flat = started("maze", gyration_spread=2.0).true_world.movables
+    solid = started("maze", "mujoco", gyration_spread=2.0).true_world.movables
+    assert flat.gyration_radii.all() and not solid.gyration_radii.any()

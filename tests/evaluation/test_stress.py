@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
+from pushplan.envs import make
 from pushplan.evaluation import Condition, stress
 from pushplan.evaluation.stress_testing import CONDITIONS, UNDISTURBED
 from pushplan.runtime.disturbances import Disturbances
+from pushplan.scenarios import suite
 from pushplan.world import InvalidInputError, Twist, UnknownNameError
 
 
@@ -70,6 +74,11 @@ def test_under_unknown_parameters_a_policy_is_told_the_nominal_ones():
 
     given = {"conditions": ["parameters-unknown"], "episodes": 2, "seed": 3, "workers": 0}
     rows = stress(Straight, "maze-3d-3", **given).rows
+    scenario = suite("maze-3d-3").scenarios[0]
+    condition = CONDITIONS["parameters-unknown"]
+    env = make(replace(scenario, variations={**scenario.variations, **condition.variations}))
+    env.reset(seed=scenario.seed)
+    assert (env.true_world.movables.masses != 0.1).all()
     assert [row.condition for row in rows] == [UNDISTURBED, "parameters-unknown"]
     assert episodes and all((objects.masses == 0.1).all() for objects in episodes)
     assert stress(Straight, "maze-3d-3", **given).rows == rows

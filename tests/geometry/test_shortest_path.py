@@ -37,6 +37,7 @@ def either_size(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch)
     """Searches as on small maps, and with the estimates that large maps need."""
     if request.param:
         monkeypatch.setattr("pushplan.geometry.visibility_graph.MANY_CORNERS", 0)
+        monkeypatch.setattr("pushplan.geometry.visibility_graph._PLAIN_BUDGETS", 0)
 
 
 def free_space(static: StaticMap, clearance: float) -> shapely.Geometry:
@@ -421,3 +422,37 @@ def test_the_way_out_of_a_crowded_dead_end_is_found_soon(monkeypatch: pytest.Mon
     (shortest, slow), (length, quick) = found
     assert shortest <= length <= 1.05 * shortest
     assert 5 * quick < slow, (quick, slow)
+
+
+@pytest.mark.usefixtures("either_size")
+@pytest.mark.parametrize("bounds", [[0.3, 0.3, 10.3, 8.3], [-1.3, -2.7, 11.1, 5.5]])
+def test_goals_on_corners_and_edges_of_the_map_are_reached(bounds: list[float]) -> None:
+    left, low, right, high = bounds
+    corner = np.array([left + 5.0, low + 4.0])
+    block = 0.1 * np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]) + corner
+    static = StaticMap.build([block], bounds=bounds)
+    start = np.array([left + 2.0, low + 5.6])
+    goals = [(x, y) for x in (left, right, 0.5 * (left + right)) for y in (low, high)]
+    for goal in goals:
+        path = VisibilityGraph(static).shortest_path(start, goal)
+        assert path.length == pytest.approx(math.dist(start, goal), rel=0.05)
+
+
+def test_that_no_way_leads_to_the_goal_is_found_soon(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pushplan.geometry.visibility_graph.MANY_CORNERS", 0)
+    monkeypatch.setattr("pushplan.geometry.visibility_graph._PLAIN_BUDGETS", 0)
+    square = np.array([[0.0, 0.0], [0.1, 0.0], [0.1, 0.1], [0.0, 0.1]])
+    wall = [square + np.array([7.0, 0.1 * i]) for i in range(100)]
+    posts = [square + np.array([0.9 * i, 0.9 * j]) for i in range(1, 7) for j in range(1, 11)]
+    room = [[7.5, 4, 9.5, 4], [9.5, 4, 9.5, 6], [9.5, 6, 7.5, 6], [7.5, 6, 7.5, 4]]
+    block = 5.0 * square + np.array([8.2, 4.7])
+    static = StaticMap.build([*wall, *posts, block], room, 0.01, bounds=[0, 0, 10, 10])
+    looks: list[None] = []
+
+    def stopped() -> bool:
+        looks.append(None)
+        return False
+
+    path = VisibilityGraph(static).to_goal((0.1, 0.1), GoalDisc((9.8, 9.8), 0.1), stopped)
+    assert math.isinf(path.length)
+    assert len(looks) < 200

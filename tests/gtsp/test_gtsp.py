@@ -382,7 +382,6 @@ def test_a_cluster_that_cannot_be_left_is_infeasible_however_large() -> None:
     assert tour.lower_bound == math.inf
 
 
-@pytest.mark.slow
 def test_large_instances_keep_promising_nodes() -> None:
     costs, clusters = pushes(60, 30, 0)
     few = GtspConfig(search_nodes=400)

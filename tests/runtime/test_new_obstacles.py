@@ -321,7 +321,6 @@ def test_a_robot_whose_policy_asks_for_no_motion_waits() -> None:
     assert last.status is CommandStatus.WAITING and last.reason
 
 
-@pytest.mark.slow
 def test_a_ship_plans_on_where_open_water_gets_its_first_obstacle() -> None:
     ship = replace(ROBOT, drive=Drive.CONSTANT_SPEED, max_speed=0.4, max_turn_rate=0.8)
     objects = Movables.from_outlines([SQUARE], [[4.0, 3.0, 0.0]], masses=[0.3])

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from pushplan.geometry import gyration_squares
 from pushplan.interaction.occupancy import ice_density
-from pushplan.world import InvalidInputError, Movables, load_world, save_world
+from pushplan.world import InvalidInputError, Movables, StaticMap, load_world, save_world
 from pushplan.world.outline_repair import MOST_CHANGE, OutlineWarning, outline_parts
 from tests.conftest import make_u_maze
 
@@ -218,3 +218,13 @@ def test_parts_that_overlap_cover_their_area_once():
 def test_radii_of_limit_surfaces_are_numbers_that_can_be_squared(radius):
     with pytest.raises(InvalidInputError, match="gyration_radii"):
         Movables.from_polygons([SQUARE], gyration_radii=[radius])
+
+
+def test_outlines_beside_concave_ones_are_copied_too():
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    corner = np.array([[3.0, 0.0], [5.0, 0.0], [5.0, 1.0], [4.0, 1.0], [4.0, 2.0], [3.0, 2.0]])
+    static = StaticMap.build([square, corner], bounds=[-1, -1, 9, 9])
+    before = static.polygons[0].copy()
+    square += 3.0
+    assert np.array_equal(static.polygons[0], before)
+    assert not any(polygon.flags.writeable for polygon in static.polygons)

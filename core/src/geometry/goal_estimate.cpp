@@ -153,7 +153,7 @@ GoalEstimate::GoalEstimate(const CoveredSides& cells, const Regions& regions, Ve
   const Index columns = cells.columns();
   const Index wanted = cells.cell_of(start);
   std::array<std::vector<Index>, kBuckets> buckets;
-  const double half = cells.cell() * std::sqrt(0.5);
+  const double half = (1.0 + 1e-6) * cells.cell() * std::sqrt(0.5);  // a goal may lie on a corner
   for (Index i = 0; i < rows * columns; ++i) {
     if (region_distance(cells.centre(i), regions) <= half) {
       distances_[at(i)] = 0;

@@ -91,6 +91,7 @@ void VisibilitySearch::expand(Index node, double length, double low) {
   }
   const Obstacles& obstacles = scene_.obstacles;
   for (std::size_t k = 0; k < corners_.middles.size(); ++k) {
+    if (bounds_[k] == kInfinity) continue;  // no way leads from there
     const double mx = corners_.middles[k].x - p.x;
     const double my = corners_.middles[k].y - p.y;
     const Vec2 half = corners_.halves[k];

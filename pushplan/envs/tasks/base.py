@@ -17,6 +17,7 @@ from pushplan.observation import ObservationBuilder, StateObservation
 from pushplan.world import (
     Drive,
     InvalidInputError,
+    Movables,
     RobotModel,
     ScenarioError,
     UnknownNameError,
@@ -199,19 +200,22 @@ class Task(ABC):
             ScenarioError: if the request cannot be met, such as too many boxes.
         """
 
-    def varied(self, world: World, rng: np.random.Generator) -> tuple[World, Materials]:
+    def varied(
+        self, world: World, rng: np.random.Generator, *, flat: bool
+    ) -> tuple[World, Materials]:
         """Draw masses, limit surfaces, casters and friction as the variations ask for.
 
         Args:
             world: a new start.
             rng: the only source of randomness.
+            flat: True in a planar simulator, the only kind that has limit surfaces.
 
         Returns:
             The start, and the materials that it has.
         """
         wanted = self.variations
         materials = wanted.vary_materials(self.materials, rng)
-        self._nominal, objects = wanted.vary_objects(world.movables, rng)
+        self._nominal, objects = wanted.vary_objects(world.movables, rng, flat=flat)
         if objects is not world.movables:
             world = replace(world, movables=objects)
         return world, materials
@@ -224,11 +228,13 @@ class Task(ABC):
         Args:
             world: the scene as the simulator has it.
         """
-        if self.variations.parameters == "known":
+        if self.variations.parameters == "known" or self._nominal is None:
             return world
         objects = world.movables
         nominal = self._nominal.select(np.isin(self._nominal.ids, objects.ids))
         return replace(world, movables=nominal.moved_to(objects.poses, objects.twists))
+
+    _nominal: Movables | None = None  # the objects of a start as the preset has them
 
     objects_leave: bool = False
     """True if objects can leave the floor, so that `leaving` has to be asked."""

@@ -63,7 +63,7 @@ class TaskVariations(CheckedFields):
     ground_friction: NonNegativeFloat | None = None
     friction_spread: Spread = 1.0  # of each of the four, one factor in a start
     wheeled: Fraction | None = None  # fraction of the objects that stand on casters, 0 to 1
-    # claim to the policy about masses and limit surfaces: the truth, or what they would be without
+    # what a policy is told of masses and limit surfaces: the truth, or what they would be without
     # scale and spreads
     parameters: Annotated[str, OneOf(("known", "unknown"))] = "known"
 
@@ -99,7 +99,7 @@ class TaskVariations(CheckedFields):
         )
 
     def vary_objects(
-        self, objects: Movables, rng: np.random.Generator
+        self, objects: Movables, rng: np.random.Generator, *, flat: bool
     ) -> tuple[Movables, Movables]:
         """Draw masses, limit surfaces and casters of the objects of a start.
 
@@ -120,7 +120,7 @@ class TaskVariations(CheckedFields):
         if self.mass_scale != 1.0 or self.mass_spread > 1.0:
             factors = self.mass_scale * self.mass_spread ** logs[:, 0]
             objects = replace(objects, masses=objects.masses * factors)
-        if self.gyration_spread > 1.0:
+        if flat and self.gyration_spread > 1.0:
             radii = np.sqrt(gyration_squares(objects)) * self.gyration_spread ** logs[:, 1]
             objects = replace(objects, gyration_radii=radii)
         return nominal, objects

@@ -67,7 +67,7 @@ def provenance(workers: int) -> dict[str, Any]:
         "cores": os.cpu_count(),
         "load": load,
         "workers": workers,
-        "packages": packages(),
+        "packages": dict(packages()),
     }
 
 

@@ -270,7 +270,6 @@ def test_getting_on_is_told_from_swaying(turn_rate):
     assert not swayed and swaying.idle > 50.0
 
 
-@pytest.mark.slow
 def test_a_robot_without_a_plan_does_not_run_away():
     class NoPlan:
         def plan(self, world, *, stop=None, rng=None):

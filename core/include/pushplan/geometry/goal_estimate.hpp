@@ -42,9 +42,9 @@ class CoveredSides {
 /// Estimates for paths from places around one start to a goal. The sides have to outlive it.
 class GoalEstimate {
  public:
-  /// How much longer than the shortest path [share] one may be that A* finds with the estimates: as
-  /// they are too long by that at most, it looks at far fewer places (Pohl 1970, "Heuristic search
-  /// viewed as path finding in a graph").
+  /// Share by which estimates are drawn out, so that A* looks at far fewer places (Pohl 1970,
+  /// "Heuristic search viewed as path finding in a graph"). Its path is longer than the shortest by
+  /// that share at most, and by more where the way weaves between things about a cell apart.
   static constexpr double kLonger = 0.05;
 
   GoalEstimate(const CoveredSides& cells, const Regions& regions, Vec2 start);
