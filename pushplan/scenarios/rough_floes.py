@@ -38,7 +38,7 @@ def roughened(
         mean_radius: of the floes of the field [m]; edges are a small part of it.
 
     Returns:
-        Of each floe its convex parts.
+        The convex parts of each floe.
     """
     return [
         outline_parts("floe", _rough_outline(rng, floe, roughness, mean_radius)).parts
@@ -67,7 +67,7 @@ def _rough_outline(
 
 
 def _depths(rng: np.random.Generator, angles: FloatArray) -> FloatArray:
-    """Depths (N,) of the outline at some angles, from 0, in no unit."""
+    """Depths (N,) of the outline at some angles, relative to each other; the least is 0."""
     periods = np.arange(2.0, max(3, len(angles) // _LEAST_EDGES))
     amplitudes = rng.standard_normal(len(periods)) * periods**-_DECAY
     phases = rng.uniform(0.0, 2.0 * np.pi, len(periods))

@@ -50,7 +50,7 @@ class ShipIceVariations(TaskVariations):
     concentration: Annotated[float, Limits(0.0, 0.5)] | None = None
     # 0 for ice that is equally likely everywhere, 1 for patches and open water
     clumping: Fraction = 0.6
-    # ``"convex"``, or after ``"real"`` fields: rough outlines, bays, sizes of a power law
+    # ``"convex"``, or ``"real"``: rough outlines with bays and sizes of a power law, as in images
     floes: Annotated[str, OneOf(("convex", "real"))] = "convex"
     channel_length: PositiveFloat | None = None  # with ice to the same distance from its end [m]
     # distance of the goal line ahead of the start line [m]
