@@ -15,9 +15,19 @@ from pushplan.perception.sighting import Sighting, sightings_of
 from pushplan.perception.track import Track, see_all
 from pushplan.world import InvalidInputError, Movables
 from pushplan.world.checks import FloatArray, array, boolean, frozen, integer, number
-from pushplan.world.outline import areas_and_centroids, convex_hull, convex_outlines, flatten
+from pushplan.world.convex_shapes import areas_and_centres, disjoint
+from pushplan.world.outline import (
+    ConvexParts,
+    areas_and_centroids,
+    convex_hull,
+    convex_outlines,
+    flatten,
+    signed_area,
+)
+from pushplan.world.outline_repair import outline_parts
 
 _SAME_SIZE = 0.2  # relative difference of sizes up to which a jump may be of the same object
+_SOLID = 0.9  # area over that of the hull from which on noise may have made the dents
 
 
 class NewSighting(NamedTuple):
@@ -31,8 +41,8 @@ class NewSighting(NamedTuple):
 class ObjectTracker:
     """Gives objects an identity, a shape, a heading and a velocity from outlines with noise.
 
-    Outlines may have noise at every corner, be slightly concave, run either way round and start
-    at any corner. A sighting within the gate of an expected place is that object (assignment of
+    Outlines may have noise at every corner, be concave, run either way round and start at any
+    corner. A sighting within the gate of an expected place is that object (assignment of
     least cost); its shape is the mean of its sightings, and its pose the least-squares fit of
     that shape, filtered by how far the fit is off. A heading goes on from the one before, so that
     a square that turns by 90 degrees in a second has turned, and starts at 0.
@@ -119,7 +129,7 @@ class ObjectTracker:
 
         Returns:
             All objects that are believed to be there now, seen or not, the oldest first. An
-            outline has its centroid as origin.
+            outline has its centroid as origin; one with large dents is cut into convex parts.
 
         Raises:
             InvalidInputError: naming the value that is no number, not finite, of a wrong shape or
@@ -241,13 +251,19 @@ class ObjectTracker:
         movables = self.movables
         self._shown = shown
         if better or gone:
-            hulls = convex_outlines("outline", [convex_hull(_plane(one.shape)) for one in better])
-            areas, centres = areas_and_centroids(*flatten(hulls))
+            rings = [_plane(one.shape) for one in better]
+            hulls = convex_outlines("outline", [convex_hull(ring) for ring in rings])
+            areas, _ = areas_and_centroids(*flatten(hulls))
+            shapes = list(map(_parts_of, rings, hulls, areas.tolist()))
+            _, centres = areas_and_centres([disjoint(parts) for parts in shapes])
             for one, area, centre in zip(better, areas.tolist(), centres.tolist(), strict=True):
                 one.area = area
                 one.middle = complex(*centre)
             changed = Movables.from_outlines(
-                [hull - centre for hull, centre in zip(hulls, centres, strict=True)],
+                [
+                    tuple(part - centre for part in parts)
+                    for parts, centre in zip(shapes, centres, strict=True)
+                ],
                 np.zeros((len(better), 3)),
                 density=self._density,
                 wheeled=np.full(len(better), self._wheeled),
@@ -269,6 +285,16 @@ class ObjectTracker:
             np.column_stack([_plane(centres + arms), headings.real]),
             np.column_stack([_plane(velocities + 1j * rates * arms), rates.real]),
         )
+
+
+def _parts_of(ring: FloatArray, hull: FloatArray, area: float) -> ConvexParts:
+    """Convex parts of an outline (N, 2) with noise, given its hull and the area of that [m²]."""
+    if signed_area(ring) > _SOLID * area:
+        return (hull,)
+    try:
+        return outline_parts("outline", ring).parts
+    except InvalidInputError:  # noise has made it cross itself
+        return (hull,)
 
 
 def _plane(points: Contour) -> FloatArray:

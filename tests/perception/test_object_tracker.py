@@ -237,3 +237,23 @@ def test_whatever_is_seen_gives_valid_objects(seed: int) -> None:
         names = [field.name for field in fields(Movables)]
         assert Movables(**{name: getattr(found, name) for name in names}) == found
         assert len(tracker.unseen_s) == len(found)
+
+
+def test_a_concave_object_keeps_its_shape() -> None:
+    corner = np.array([[0.0, 0.0], [0.6, 0.0], [0.6, 0.2], [0.2, 0.2], [0.2, 0.6], [0.0, 0.6]])
+    square = np.array([[0.0, 0.0], [0.4, 0.0], [0.4, 0.4], [0.0, 0.4]])
+    rng = np.random.default_rng(0)
+    tracker = ObjectTracker()
+    for step in range(30):
+        angle, place = 0.03 * step, np.array([0.02 * step, 1.0])
+        turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        true = corner @ turn + place
+        seen = [outline + rng.normal(0.0, 0.005, outline.shape) for outline in (true, square + 3.0)]
+        found = tracker.update(seen, 0.1 * step)
+    union = shapely.union_all([shapely.Polygon(part) for part in found.parts_world(0)])
+    whole = shapely.Polygon(true)
+    assert union.intersection(whole).area > 0.93 * union.union(whole).area
+    assert len(found.parts(0)) > 1 and len(found.parts(1)) == 1
+    np.testing.assert_allclose(
+        found.poses[0, :2], shapely.get_coordinates(whole.centroid)[0], atol=0.01
+    )
