@@ -87,7 +87,7 @@ def test_flipped_bits_never_end_in_a_traceback(run: Path, tmp_path: Path) -> Non
                 outcomes.append(error)
             for rest in ("results.db-wal", "results.db-shm"):
                 (run / rest).unlink(missing_ok=True)
-        assert salvage(run, tmp_path / f"saved{trial}").rows >= 20
+        assert salvage(run, tmp_path / f"saved{trial}").rows >= len(JOBS)
     assert outcomes
 
 
