@@ -228,9 +228,8 @@ class Movables(ArrayRecord, CheckedFields):
         shapes = shapes_of("polygon", polygons)
         centres = areas_and_centres([disjoint(parts) for parts in shapes])[1]
         poses = np.column_stack([centres, np.zeros(len(shapes))])
-        outlines = [  # tuples: of one part each they are checked all at once
-            tuple(part - centre for part in parts)
-            for parts, centre in zip(shapes, centres, strict=True)
+        outlines = [
+            [part - centre for part in parts] for parts, centre in zip(shapes, centres, strict=True)
         ]
         return cls.from_outlines(outlines, poses, **options)
 
