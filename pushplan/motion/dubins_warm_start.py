@@ -7,12 +7,14 @@ tangents there, and from place to place on the shortest curve of bounded curvatu
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from pushplan.core import motion as core
 from pushplan.geometry import VisibilityGraph
 from pushplan.motion.keep_out import keep_out
+from pushplan.motion.local_windows import drive_in_windows
 from pushplan.motion.path_improver import PathImprover
 from pushplan.motion.path_search_config import EDGE, INSET
 from pushplan.world import GoalDisc, NavigationGoal, World
@@ -45,10 +47,14 @@ def warm_start(improver: PathImprover) -> None:
         if improver.stopped():
             return  # the contours alone take their time on a large map
         world = improver.world.moved(robot_pose=improver.lead.pose)
-        arcs = warm_start_arcs(world, improver.goal, clearance, radius, depth, improver.stopped)
-        if arcs is None:
+        vias = _guide(world, improver.goal, clearance, radius, depth, improver.stopped)
+        if vias is None:
             continue
+        curves = partial(_curves, radius=radius)
+        arcs = curves(improver.lead.pose, vias)
         if improver.candidate(arcs, improver.jam_cost, free=False) is not None:
+            return
+        if is_far(improver) and drive_in_windows(improver, vias, curves):
             return
 
 
@@ -65,13 +71,29 @@ def warm_start_arcs(
     Returns:
         (E, 2) length [m] and curvature [1/m] of each arc, or None if there is no way.
     """
+    vias = _guide(world, goal, clearance, radius, depth, stopped)
+    return None if vias is None else _curves(world.robot_pose, vias, radius)
+
+
+def _guide(
+    world: World,
+    goal: NavigationGoal,
+    clearance: float,
+    radius: float,
+    depth: float,
+    stopped: Callable[[], bool],
+) -> FloatArray | None:
+    """Poses (V, 3) along the shortest homotopic path, or None if there is no way."""
     start = world.robot_pose[:2]
     corners = VisibilityGraph(keep_out(world), clearance).to_goal(start, goal, stopped).points
     if len(corners) < 2:
         return None
-    vias = _vias(corners, radius, depth)
+    return _vias(corners, radius, depth)
+
+
+def _curves(here: FloatArray, vias: FloatArray, radius: float) -> FloatArray:
+    """(3 V, 2) arcs of the shortest curves from a pose (3,) through vias (V, 3)."""
     arcs = np.empty((3 * len(vias), 2))
-    here = world.robot_pose
     for i, there in enumerate(vias):
         core.dubins(here, there, radius, arcs[3 * i : 3 * i + 3])
         here = there

@@ -84,6 +84,7 @@ class PathImprover:
         self.best_cost = np.inf
         self.first_solution_s = float("nan")
         self.turning_radius = turning_radius
+        self.interaction = interaction
         self.contacts = compile_interaction(interaction, world)
         self._jam_length = self._endless_length()
         self.room = Room(
@@ -98,7 +99,7 @@ class PathImprover:
         self._margin = 0.0
         self._shortcut_pace = Pace()
         self._sweep_pace = Pace()
-        self._best: SweptPath | None = None
+        self.best: SweptPath | None = None
 
     def begin(self) -> PlanStatus | None:
         """Find the margin that can be kept; a status where the call ends here already."""
@@ -204,24 +205,34 @@ class PathImprover:
         """The path along some arcs with its cost; None if it is not one that could be a plan."""
         path, used = self.laid_out(np.concatenate([self.lead.pieces, arcs]))
         if not free:
-            checker = core.CollisionChecker(self.room.footprint, self.room.walls)
-            blocked = checker.first_blocked(path.poses[:used]) < used
             x, y = path.poses[used - 1, :2]
-            if blocked or self.goal.distance(float(x), float(y)) > 0.0:
+            if self.first_blocked(path, used) < used or self.goal.distance(x, y) > 0.0:
                 return None
-        cost = self._cost_of(path, used, limit)
+        return self.swept(path, used, limit)
+
+    def swept(self, path: SweptPath, count: int, limit: float) -> Candidate | None:
+        """The first ``count`` poses of a path with their cost; None where it passes the limit."""
+        cost = self._cost_of(path, count, limit)
         if cost is None:
             return None
-        self._keep(path, used, cost)
+        self._keep(path, count, cost)
         trial = make_swept_path(len(path.poses), len(self.world.movables))
-        return Candidate(path, trial.view(), used, cost)
+        return Candidate(path, trial.view(), count, cost)
 
-    def laid_out(self, arcs: FloatArray) -> tuple[SweptPath, int]:
-        """The poses along arcs (E, 2) from the robot to the goal, not swept, and their number."""
+    def first_blocked(self, path: SweptPath, count: int) -> int:
+        """The first of ``count`` poses at which the robot touches a wall; ``count`` if none."""
+        checker = core.CollisionChecker(self.room.footprint, self.room.walls)
+        return checker.first_blocked(path.poses[:count])
+
+    def laid_out(
+        self, arcs: FloatArray, start: FloatArray | None = None
+    ) -> tuple[SweptPath, int]:
+        """Poses along arcs (E, 2) from the robot or a pose to the goal, not swept; their number."""
         steps = [abs(arc) / core.step_along(turn, self.room.spacing) for arc, turn in arcs.tolist()]
         capacity = 3 * int(sum(steps) + len(arcs)) + 200
         path = make_swept_path(capacity, len(self.world.movables))
-        used = core.lay_out(self.world.robot_pose, arcs, path.view(), self.problem)
+        begin = self.world.robot_pose if start is None else start
+        used = core.lay_out(begin, arcs, path.view(), self.problem)
         assert used > 0  # there is room for three times as many poses
         path.objects[0] = self.world.movables.poses
         return path, used
@@ -274,14 +285,14 @@ class PathImprover:
             self.first_solution_s = self._call.elapsed
         self.best_cost = cost
         self.tight = self.relaxed > 1
-        self._best = SweptPath(*(part[:count].copy() for part in path))
+        self.best = SweptPath(*(part[:count].copy() for part in path))
 
     def result(self, status: PlanStatus, **detail: float) -> PlanResult:
         """The result of the call: the best path so far as a plan, where the status has one."""
         plan = None
         if status.has_plan:
-            assert self._best is not None
-            plan = timed_plan(self.world, self._best, self.config.turn_fraction)
+            assert self.best is not None
+            plan = timed_plan(self.world, self.best, self.config.turn_fraction)
         return self._call.result(
             status,
             plan,
