@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pushplan.core import motion as core
+from pushplan.motion.dubins_warm_start import along_guide, curves_through, guides, is_far, is_way
 from pushplan.motion.path_improver import PathImprover
 from pushplan.motion.random_tree.tree_paths import TreePaths
 from pushplan.motion.swept_path import SweptPath, make_swept_path
@@ -54,14 +55,23 @@ class _Way:
     bends: FloatArray  # (V,) length at which each of the last vias is reached [m]
 
 
-def drive_in_windows(
+def warm_start(improver: PathImprover) -> None:
+    """Try to drive along the shortest homotopic path, objects or not; the improver keeps it.
+
+    Where the curves along it fail and the goal is far, windows are searched.
+    """
+    for vias in guides(improver):
+        if is_way(improver, vias) or (is_far(improver) and _drive_in_windows(improver, vias)):
+            return
+
+
+def _drive_in_windows(
     improver: PathImprover,
     vias: FloatArray,  # (V, 3) poses along the guide, the last in the goal
-    curves: Callable[[FloatArray, FloatArray], FloatArray],  # arcs from a pose along vias
 ) -> bool:
     """Follow a guide, with searches in windows where that fails; True where it leads to a plan."""
     head, fixed = improver.laid_out(improver.lead.pieces)
-    way = _continued(improver, head, fixed, vias, curves)
+    way = _continued(improver, head, fixed, vias)
     reached = 0.0
     level = 0
     for _ in range(_WINDOWS):
@@ -84,7 +94,7 @@ def drive_in_windows(
             left[-1] = True
             if end == way.count - 1:
                 left[:] = False
-            way = _continued(improver, path, count, vias[len(vias) - len(left) :][left], curves)
+            way = _continued(improver, path, count, vias[len(vias) - len(left) :][left])
             vias = vias[len(vias) - len(left) :][left]
             break
         else:
@@ -97,10 +107,9 @@ def _continued(
     head: SweptPath,
     fixed: int,
     vias: FloatArray,
-    curves: Callable[[FloatArray, FloatArray], FloatArray],
 ) -> _Way:
     """The first poses of a path, and curves along vias behind them."""
-    arcs = curves(head.poses[fixed - 1], vias)
+    arcs = curves_through(vias, head.poses[fixed - 1], improver.turning_radius)
     tail, count = improver.laid_out(arcs, head.poses[fixed - 1])
     path = _joined(improver, (head, 0, fixed), (tail, 1, count))
     begun = arc_lengths(head.poses[:fixed, :2])[-1]
@@ -207,7 +216,8 @@ def _search(outer: PathImprover, world: World) -> SweptPath | None:
     trees = TreePaths(improver)
     if improver.begin() is None:
         trees.look_ahead()
-        while not improver.stopped():
+        solved = along_guide(improver, around=True) or along_guide(improver)
+        while not solved and not improver.stopped():
             for _ in trees.grow_two(outer.config.push_weight):
                 break
             if improver.solved or trees.sealed or trees.boxed_in:

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pushplan.interaction import InteractionModel, QuasiStatic
-from pushplan.motion.dubins_warm_start import is_far, warm_start
+from pushplan.motion.dubins_warm_start import is_far
+from pushplan.motion.local_windows import warm_start
 from pushplan.motion.path_improver import Candidate, PathImprover
 from pushplan.motion.path_search_config import LEAST_GAIN, PathSearchConfig
 from pushplan.motion.random_tree.tree_paths import TreePaths
