@@ -25,6 +25,7 @@ from pushplan.world import Goal, StaticMap
 from pushplan.world.checks import FloatArray, IntArray, array, expect, number
 
 _PLAIN_BUDGETS = 5  # of a search without estimates, enough where the way is about straight
+_CELLS = 10_000  # of estimates between two looks at a stop rule: about a millisecond
 _BUDGET = 20_000  # work of a search between two looks at a stop rule: about a millisecond
 
 
@@ -68,7 +69,7 @@ class VisibilityGraph:
         """The shortest path from a point (2,) [m] to the nearest point that counts as the goal.
 
         There is none either where ``stopped``, which is asked about every millisecond, ends the
-        search; estimates on a large map are made in one piece, of some ten milliseconds.
+        search.
         """
         origin: FloatArray = array("start", start, (2,))
         target = as_target(goal)
@@ -110,6 +111,9 @@ class VisibilityGraph:
             if budgets == _PLAIN_BUDGETS and has_many_corners(around):
                 sides = _covered_sides(static, clearance)
                 estimate = core.GoalEstimate(sides, scene, free)
+                while not estimate.run(_CELLS):
+                    if stopped():
+                        return Path(math.inf)
                 search = core.VisibilitySearch(free, corners, scene, grid, sliver, estimate)
             outcome = search.run(_BUDGET)
             budgets += 1
