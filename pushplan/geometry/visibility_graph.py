@@ -35,9 +35,9 @@ class VisibilityGraph:
     Straight walls and polygons are exact; where a path bends around an arc (a thick segment's end,
     a corner at a clearance), that arc comes out at most 0.07 % too long, or 0.6 % where obstacles
     have more than 2,200 corners. A long search on such a map gives a path that is as a rule at most
-    5 % longer than the shortest. Paths stay inside ``static.bounds`` and may touch obstacles; obstacles that touch each
-    other leave no passage. Only what a path may need of the graph is made. `goal_distances` makes
-    all of it, and pays where many paths lead to one goal.
+    5 % longer than the shortest. Paths stay inside ``static.bounds`` and may touch obstacles;
+    obstacles that touch each other leave no passage. Only what a path may need of the graph is
+    made. `goal_distances` makes all of it, and pays where many paths lead to one goal.
 
     Args:
         static: obstacles and bounds.
