@@ -51,12 +51,14 @@ def rooms(seed: int, side: float = 0.4, door: float = 0.9, doors: int = 8) -> Wo
 
 
 @pytest.mark.parametrize("name", PLANNERS)
-@pytest.mark.parametrize("side", [0.4, 0.7])
-def test_a_way_through_many_doors_with_boxes_is_found_soon(name: str, side: float) -> None:
-    for seed in range(3):
+@pytest.mark.parametrize(("side", "most"), [(0.4, 1_000), (0.7, 6_000)])
+def test_a_way_through_many_doors_with_boxes_is_found_soon(
+    name: str, side: float, most: int
+) -> None:
+    for seed in (1, 3, 5):
         world = rooms(seed, side)
         result = make_planner(name).plan(
-            world, stop=FirstSolution() | MaxIterations(6_000), rng=np.random.default_rng(seed)
+            world, stop=FirstSolution() | MaxIterations(most), rng=np.random.default_rng(seed)
         )
         assert result.plan is not None, (seed, result.status)
         check_plan(world, result.plan, result.status)
