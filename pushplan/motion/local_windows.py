@@ -47,11 +47,15 @@ class _FirstPlanWithin(Stop):
 def warm_start(improver: PathImprover) -> None:
     """Try to drive along the shortest homotopic path, objects or not; the improver keeps it.
 
-    Where the curves along it fail and the goal is far, windows are searched.
+    Where the curves along it fail and the goal is far, windows are searched. What is found of a way
+    to a far goal is shortcut at once, as trees are slow to find better ones.
     """
+    far = is_far(improver)
     for vias in guides(improver):
-        if is_way(improver, vias) or (is_far(improver) and _GuidedDrive(improver, vias).run()):
-            return
+        if is_way(improver, vias) or (far and _GuidedDrive(improver, vias).run()):
+            break
+    if far and improver.solved:
+        improver.work_out_best()
 
 
 class _GuidedDrive:
