@@ -322,7 +322,7 @@ class PathImprover:
                     problem,
                     self.contacts,
                 )
-                self.keep(candidate.path, candidate.count, candidate.cost)
+            self.keep(candidate.path, candidate.count, candidate.cost)
             self.iterations += self._batch
 
     def keep(self, path: SweptPath, count: int, cost: float) -> None:
