@@ -22,7 +22,7 @@ circumscribed radius [squared circumscribed radii]: 2 % of a way of one radius."
 _RESPONSE = 0.02
 """For how long the motors may hold on to the last velocity, beyond the known delay [s]."""
 _SETTLED = 1.5  # factor of the variance that is left in the end by which an estimate is ready
-_SURE = 3.0  # standard deviations by which two filters differ only if the prediction is wrong
+_SURE = 4.0  # standard deviations by which two filters differ only if the prediction is wrong
 
 
 class StateEstimator:
@@ -89,8 +89,9 @@ class StateEstimator:
             self._variances = np.tile(self._noise, (1 + len(world.movables), 1))
             self._offsets = np.zeros_like(self._variances)
         elif self._gain < 1.0:
-            self._variances = self._variances + self._drift(self._world, world.time)
-            world = self._blend(self._advanced(self._world, world.time), world)
+            predicted = self._advanced(self._world, world.time)
+            self._variances = self._variances + self._drift(self._world, predicted)
+            world = self._blend(predicted, world)
         self._world = self._ahead = world
         self._drop_before(world.time)
         return world
@@ -148,49 +149,67 @@ class StateEstimator:
         before = bisect_right(self._sent, time, key=lambda sent: sent[0])
         return self._sent[before - 1][1] if before else Twist(0.0, 0.0)
 
-    def _drift(self, world: World, time: float) -> FloatArray:
-        """(1 + K, 3) variances that the poses of robot and objects gain until a time."""
-        path = self._path(world, time)
+    def _drift(self, world: World, predicted: World) -> FloatArray:
+        """(1 + K, 3) variances that the poses of robot and objects gain by a prediction."""
+        path = np.stack([world.robot_pose, predicted.robot_pose])
         size = world.robot.circumscribed_radius
-        steps = np.abs(np.diff(path, axis=0))
-        driven = float(np.hypot(steps[:, 0], steps[:, 1]).sum() + size * steps[:, 2].sum())
-        changes = np.zeros(2)
+        dx, dy, turn = (path[1] - path[0]).tolist()
+        drift = _DRIFT * size * (math.hypot(dx, dy) + size * abs(turn))
+        speeds = rates = 0.0  # squares of the changes of what is driven
         for (_, before), (at, after) in itertools.pairwise(self._sent):
-            if world.time <= at < time:
-                changes += np.square([after.linear - before.linear, after.angular - before.angular])
-        gained = _DRIFT * size * driven + _RESPONSE**2 * changes * [1.0, size**2]
-        touched = np.concatenate([[True], _near(world, path)])[:, None]
-        radii = np.concatenate([[size], world.movables.radii])[:, None]
-        return touched * gained[[0, 0, 1]] / radii ** [0, 0, 2]
+            if world.time <= at < predicted.time:
+                speeds += (after.linear - before.linear) ** 2
+                rates += (after.angular - before.angular) ** 2
+        place = drift + _RESPONSE**2 * speeds
+        rim = drift + (_RESPONSE * size) ** 2 * rates
+        moved = (predicted.movables.poses != world.movables.poses).any(axis=1)
+        touched = np.concatenate([[True], moved | _near(world, path)])
+        radii = np.concatenate([[size], world.movables.radii])
+        drifts = np.zeros((len(radii), 3))
+        drifts[touched, :2] = place
+        drifts[touched, 2] = rim / radii[touched] ** 2
+        return drifts
 
     def _blend(self, predicted: World, seen: World) -> World:
         """Between what was predicted and what is seen."""
         new = seen.movables
-        _, here, there = np.intersect1d(new.ids, predicted.movables.ids, return_indices=True)
-        here = np.concatenate([[0], 1 + here])
-        there = np.concatenate([[0], 1 + there])
+        ids = predicted.movables.ids
+        here, there = (
+            np.concatenate([[0], 1 + rows])
+            for rows in np.intersect1d(new.ids, ids, return_indices=True)[1:]
+        )
         poses = np.vstack([seen.robot_pose, new.poses])
         expected = np.vstack([predicted.robot_pose, predicted.movables.poses])[there]
         away = poses[here] - expected
         away[:, 2] = np.remainder(away[:, 2] + math.pi, 2.0 * math.pi) - math.pi
-        noise = self._noise
-        gain = self._gain
-        variances = self._variances[there]
         offsets = self._offsets[there]
-        wrong = offsets**2 > _SURE**2 * gain / (2.0 - gain) * noise
-        variances = np.maximum(variances, wrong * gain / (1.0 - gain) * noise)
-        total = variances + noise
-        gains = np.minimum(
-            gain, np.divide(variances, total, np.ones_like(total), where=noise > 0.0)
-        )
-        corrected = (1.0 - gains) ** 2 * variances + gains**2 * noise
-        self._variances = np.tile(noise, (len(poses), 1))
+        before = self._variances[there]
+        gains, after = self._gains(offsets, before)
         # what nobody has seen is where it was predicted, to the last bit
-        self._variances[here] = np.where(away.any(axis=1)[:, None], corrected, variances)
+        unseen = ~away.any(axis=1, keepdims=True)
+        self._variances = np.tile(self._noise, (len(poses), 1))
+        self._variances[here] = np.where(unseen, before, after)
         self._offsets = np.zeros_like(self._variances)
-        self._offsets[here] = offsets + gain * (away - offsets) - gains * away
+        self._offsets[here] = offsets + self._gain * (away - offsets) - gains * away
         poses[here] = expected + gains * away
         return replace(seen, robot_pose=poses[0], movables=new.moved_to(poses[1:], new.twists))
+
+    def _gains(self, offsets: FloatArray, variances: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Parts (N, 3) of the differences to take over, and the variances that this leaves.
+
+        Args:
+            offsets: (N, 3) of the filter with the fixed gain from the estimate [m, m, rad].
+            variances: (N, 3) of the prediction.
+        """
+        noise = self._noise
+        gain = self._gain
+        wrong = offsets**2 > _SURE**2 * gain / (2.0 - gain) * noise
+        # with this variance the gain is the fixed one
+        variances = np.maximum(variances, wrong * gain / (1.0 - gain) * noise)
+        gains = np.full_like(variances, gain)
+        np.divide(variances, variances + noise, out=gains, where=noise > 0.0)
+        gains = np.minimum(gains, gain)
+        return gains, (1.0 - gains) ** 2 * variances + gains**2 * noise
 
 
 def _near(world: World, path: FloatArray) -> BoolArray:
