@@ -223,12 +223,13 @@ class Runner:
         """Take a snapshot, and see whether it is sure by now that the goal is reached."""
         seen = self._estimator.observe(world)
         of_robot = isinstance(world.goal, GoalDisc | GoalLine)
-        if seen.goal_reached and self._estimator.is_settled(self._noise, robot_only=of_robot):
+        exact = of_robot and not self._allowance.is_noisy
+        once = exact or not world.robot.can_stop  # one that drives on may be out soon
+        ready = once or self._estimator.is_settled(self._noise, robot_only=of_robot)
+        if seen.goal_reached and ready:
             self._done += 1
         else:
             self._done = max(0, self._done - 1)
-        exact = of_robot and not self._allowance.is_noisy
-        once = exact or not world.robot.can_stop  # one that drives on may be out soon
         self._surely_done = self._surely_done or self._done >= (1 if once else _SURE)
 
     def _drop_plans(self) -> None:

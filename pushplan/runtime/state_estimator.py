@@ -69,9 +69,9 @@ class StateEstimator:
         return np.sqrt(left)
 
     def is_settled(self, noise: FloatArray, *, robot_only: bool) -> bool:
-        """True if no more than a noise (3,) is left in robot and objects, or in the robot."""
-        left = self._variances[: 1 if robot_only else None]
-        return bool(((left <= _SETTLED * noise**2) | (self._noise == 0.0)).all())
+        """True if no more than a noise (3,) is left in all poses, or in the robot's place."""
+        ready = (self._variances <= _SETTLED * noise**2) | (self._noise == 0.0)
+        return bool(ready[:1, :2].all() if robot_only else ready.all())
 
     def reset(self) -> None:
         """Forget everything."""
