@@ -26,7 +26,7 @@ from pushplan.planners.rearrangement.rearrangement_policy import (
 )
 from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.world import InvalidInputError, Plan, PlanningExecutor, Stop, Twist, World
-from pushplan.world.checks import FloatArray, expect
+from pushplan.world.checks import FloatArray, IntArray, expect
 
 _SAME_OBJECTS = 0.05  # objects have not moved if all by less [circumscribed radii]
 _SAME_PLACE = 0.02  # the robot has not moved if by less [circumscribed radii, rad]
@@ -83,6 +83,7 @@ class GtspMpc(RearrangementPolicy):
         self._searched: PushScene | None = None
         self._cache = RolloutCache()
         self._history = PushHistory()
+        self._delivered: IntArray = np.zeros(0, dtype=np.int64)
         self._left = -1
         self._rounds = 0
         self._retreats = 0
@@ -132,7 +133,8 @@ class GtspMpc(RearrangementPolicy):
 
     def _observe(self, world: World) -> PushScene:
         """Look at the scene, and notice what has been done since the last look."""
-        scene = PushScene(world, self.config, self._cache)
+        scene = PushScene(world, self.config, self._cache, delivered=self._delivered)
+        self._delivered = scene.movables.ids[scene.done]
         left = len(scene.left)
         if left != self._left:  # something was done, or has come back
             self._left = left

@@ -169,7 +169,7 @@ def scene_after(scene: PushScene, push: Push) -> PushScene:
     there = np.flatnonzero(after[:, 0] < 0.5 * core.REMOVED)
     movables = world.movables.select(there).moved_to(after[there])
     moved = replace(world, robot_pose=push.end, robot_twist=np.zeros(3), movables=movables)
-    return PushScene(moved, scene.config, scene.cache)
+    return PushScene(moved, scene.config, scene.cache, delivered=scene.delivered)
 
 
 def select_push(scene: PushScene, penalty: Callable[[Push], float] = lambda _: 0.0) -> PushChoice:

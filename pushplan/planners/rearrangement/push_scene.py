@@ -30,7 +30,7 @@ from pushplan.planners.rearrangement.rearrangement_config import RearrangementCo
 from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.planners.rearrangement.search_budget import SearchBudget
 from pushplan.world import Movables, World
-from pushplan.world.checks import BoolArray, FloatArray
+from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 # Lengths are in circumscribed radii of the robot.
 _GOAL_SLACK = 0.012
@@ -79,12 +79,15 @@ class PushScene:
         config: settings.
         cache: what is known from the last scene.
         budget: of the decision that is made for it; endless by default.
+        delivered: ids of objects that were done before; with noise they are so until they are
+            surely not.
     """
 
     world: World
     config: RearrangementConfig
     cache: RolloutCache | None = None
     budget: SearchBudget = field(default_factory=SearchBudget)
+    delivered: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def __post_init__(self) -> None:
         check_pusher(self.world)
@@ -178,12 +181,20 @@ class PushScene:
 
     def are_done(self, poses: FloatArray) -> BoolArray:
         """(K,) whether objects at poses (K, 3) are where they belong."""
-        return core.all_done(poses, self.bodies, self.object_goal)
+        done: BoolArray = core.all_done(poses, self.bodies, self.object_goal)
+        if self.config.position_noise > 0.0 and len(self.delivered):
+            stays = core.all_done(poses, self.bodies, self._goal_with(0.0))
+            done |= stays & np.isin(self.movables.ids, self.delivered)
+        return done
 
     @cached_property
     def object_goal(self) -> core.ObjectGoal:
         """When objects are done."""
-        slack = _GOAL_SLACK * self.size + 2.0 * self.config.position_noise
+        return self._goal_with(2.0 * self.config.position_noise)
+
+    def _goal_with(self, noise: float) -> core.ObjectGoal:
+        """When objects are done that have to be farther from the goal's edge by a noise [m]."""
+        slack = _GOAL_SLACK * self.size + noise
         return make_object_goal(self.world.goal, self.world.static, slack)
 
     @cached_property
