@@ -81,6 +81,7 @@ class GtspMpc(RearrangementPolicy):
         self._execution: PushExecution | None = None
         self._shown: Push | None = None
         self._searched: PushScene | None = None
+        self._unfinished: PushScene | None = None
         self._cache = RolloutCache()
         self._history = PushHistory()
         self._left = -1
@@ -152,6 +153,9 @@ class GtspMpc(RearrangementPolicy):
             if self._searched is scene:  # one search a step is enough
                 return False
             self._searched = scene
+            unfinished = self._unfinished
+            if unfinished is not None and _stands_still(scene, unfinished):
+                scene = unfinished  # the search goes on with what it has found so far
             self._choosing = choose_push(
                 scene, self._history, self._executor, self.stop, self.costs
             )
@@ -162,7 +166,11 @@ class GtspMpc(RearrangementPolicy):
         if not choosing.call.ready(scene.world.time):
             return False
         self._choosing = None
-        return self._begin(scene, choosing.call.result())
+        choice = choosing.call.result()
+        self._unfinished = None
+        if choice.first is None and choice.interrupted and not choosing.ahead:
+            self._unfinished = choosing.scene
+        return self._begin(scene, choice)
 
     def _approach_and_push(self, scene: PushScene) -> Twist | None:
         """The next command of the push in hand; None where there is none, or it has ended."""
@@ -227,6 +235,7 @@ class GtspMpc(RearrangementPolicy):
             self._recovery = lambda world, held: follower.command(
                 world.robot_pose, world.time, held
             )
+            self._unfinished = None
             self._cache = RolloutCache()  # that nothing was found is no longer true out there
             return True
         if choice.interrupted:  # the next search begins with what is known by now
@@ -241,6 +250,7 @@ class GtspMpc(RearrangementPolicy):
 
     def _tries_anew(self, scene: PushScene) -> bool:
         """Forget what was searched elsewhere, or tried when objects were farther away, or stop."""
+        self._unfinished = None
         if self._cache.is_from_elsewhere(scene.robot_cell):
             self._cache = RolloutCache()
             return True
@@ -273,6 +283,12 @@ class GtspMpc(RearrangementPolicy):
                 scene.world, distance, skip=self._retreats, looks=False, searches=False
             ).command
             self._retreats += 1
+
+
+def _stands_still(one: PushScene, other: PushScene) -> bool:
+    """Return True if neither the robot nor an object has moved between two scenes."""
+    moved = np.abs(one.world.robot_pose - other.world.robot_pose).max()
+    return bool(moved <= _SAME_PLACE * one.size) and _alike(one, other)
 
 
 def _alike(one: PushScene, other: PushScene) -> bool:

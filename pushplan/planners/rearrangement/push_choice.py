@@ -140,7 +140,7 @@ def choose_push(
         scene.budget.start(rule, most)
         choice = select_push(scene, penalty)
         recovery = None
-        if choice.first is None:
+        if choice.first is None and not scene.budget.stopped:
             recovery = recovery_path(scene.world, 0.5 * MARGIN * size)
         return replace(
             choice,
@@ -184,11 +184,17 @@ def select_push(scene: PushScene, penalty: Callable[[Push], float] = lambda _: 0
         penalty: what to add to the cost of a push [m].
     """
     choice = _select(scene, build_push_graph(scene, penalty), penalty)
+    while scene.budget.next_round():
+        better = _select(scene, build_push_graph(scene, penalty), penalty)
+        if better.first is not None or choice.first is None:
+            choice = better
     left = len(scene.left)
     for relocations, thorough in ((0, False), (min(_NEAREST, left), False), (left, True)):
         if choice.first is None and not scene.budget.is_used_up:
             if thorough:
-                scene = scene.on_finer_lattice()
+                if not scene.budget.has_room(scene.finer_lattice_s):
+                    break
+                scene = scene.known("finer", scene.on_finer_lattice)
             graph = build_push_graph(
                 scene, penalty, onward=True, relocations=relocations, thorough=thorough
             )
@@ -202,27 +208,39 @@ def _select(scene: PushScene, graph: PushGraph, penalty: Callable[[Push], float]
     It is simulated on the cheapest path, and if that spoils the push around its object.
     """
     known: dict[int, SimulatedPush] = {}
-    around: dict[int, ApproachTree] = {}
+    budget = scene.budget
+    simulated: dict[int, tuple[Push, SimulatedPush | None]] = scene.known("simulated", dict)
 
     def simulated_cost(n: int) -> tuple[float, tuple[int, ...]] | None:
-        if scene.budget.is_used_up and any(math.isfinite(one.cost) for one in known.values()):
-            return None
         push = graph.pushes[n]
-        target = int(np.flatnonzero(scene.movables.ids == push.target)[0])
-        found = _simulated(scene, graph.approach, push, target)
-        if found is None or not math.isfinite(found.cost):
-            if target not in around:
-                around[target] = approach_tree(scene, target)
-            found = _simulated(scene, around[target], push, target) or found
+        if id(push) not in simulated:
+            if budget.is_used_up:
+                if budget.stopped or any(math.isfinite(one.cost) for one in known.values()):
+                    return None
+            found = _first_push(scene, graph.approach, push)
+            if budget.stopped and (found is None or not math.isfinite(found.cost)):
+                return None  # it may only be that there was no time for a route
+            simulated[id(push)] = push, found
+        found = simulated[id(push)][1]
         if found is None:
             return math.inf, ()
         known[n] = found
-        scene.budget.cost = min(scene.budget.cost, found.cost)
+        budget.cost = min(budget.cost, found.cost)
         return found.cost + penalty(push), found.push.delivers
 
     order = sequence_pushes(graph, simulated_cost, scene.config.max_simulations)
     plan = tuple(graph.pushes[n] for n in order)
     return PushChoice(graph, plan, known[order[0]] if order else None)
+
+
+def _first_push(scene: PushScene, approach: ApproachTree, push: Push) -> SimulatedPush | None:
+    """A push with the route to it, which leads around its object where the cheapest one fails."""
+    target = int(np.flatnonzero(scene.movables.ids == push.target)[0])
+    found = _simulated(scene, approach, push, target)
+    if (found is None or not math.isfinite(found.cost)) and not scene.budget.stopped:
+        around = scene.known(("around", target), lambda: approach_tree(scene, target))
+        found = _simulated(scene, around, push, target) or found
+    return found
 
 
 def _simulated(

@@ -45,8 +45,15 @@ def relocating_pushes(
         if found is None and cache.searches >= scene.config.max_searches:
             return []
     if found is None:
-        found = RelocationSearch(scene, k, approach, thorough).run()
-        if cache is not None and not scene.budget.is_over:
+        if not scene.push_cost_to_go(k).prepare(scene.budget):
+            return []
+        search = scene.known(
+            ("relocations", k, thorough), lambda: RelocationSearch(scene, k, approach, thorough)
+        )
+        found = search.run()
+        if search.interrupted and scene.budget.stopped:  # the next decision goes on with it
+            return []
+        if cache is not None and not search.interrupted:
             cache.keep_relocations(int(movables.ids[k]), asked, found)
     pushes = []
     for path, extra, moved in found:
