@@ -2,9 +2,10 @@
 
     python -m benchmarks.speed.decisions [--suites NAME ...] [--episodes N] [--seed FIRST]
 
-Every episode runs without a deadline and with each of ``--deadlines``. The clock of deadlines is the
-CPU time of the thread, so that other jobs of the machine change nothing. A decision is all that happens
-between the question for the next push and its answer; the overrun is its time beyond the deadline.
+Every episode runs without a deadline and with each of ``--deadlines``. The clock of deadlines is
+the CPU time of the thread, so that other jobs of the machine change nothing. A decision is all that
+happens between the question for the next push and its answer; the overrun is its time beyond the
+deadline.
 """
 
 from __future__ import annotations
@@ -72,8 +73,8 @@ def main() -> None:
     options = parser.parse_args()
     time.perf_counter = time.thread_time
     sys.stdout.write(
-        "| suite | deadline [ms] | episodes | S | E | I | decisions | median [ms] | longest "
-        "| overrun p99.9 | worst |\n|---|---|---|---|---|---|---|---|---|---|---|\n"
+        "| suite | deadline [ms] | episodes | S | E | I | duration [s] | decisions "
+        "| median [ms] | longest | overrun p99.9 | worst |\n" + 12 * "|---" + "|\n"
     )
     for suite in options.suites:
         for deadline in (None, *options.deadlines):
@@ -90,6 +91,7 @@ def main() -> None:
                 f"{np.mean([row.metrics[name] for row in results.rows]):.3f}"
                 for name in ("S_manip", "E_manip", "I_manip")
             ]
+            duration = np.mean([row.metrics["sim_time_s"] for row in results.rows])
             taken = 1e3 * np.array(DECISIONS)
             late = ["", ""]
             if deadline is not None:
@@ -100,6 +102,7 @@ def main() -> None:
                 "" if deadline is None else f"{1e3 * deadline:g}",
                 str(len(results.rows)),
                 *scores,
+                f"{duration:.0f}",
                 str(len(taken)),
                 f"{np.median(taken):.0f}",
                 f"{taken.max():.0f}",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -81,7 +81,7 @@ class GtspMpc(RearrangementPolicy):
         self._execution: PushExecution | None = None
         self._shown: Push | None = None
         self._searched: PushScene | None = None
-        self._unfinished: PushScene | None = None
+        self._unfinished: _Unfinished | None = None
         self._cache = RolloutCache()
         self._history = PushHistory()
         self._left = -1
@@ -153,11 +153,22 @@ class GtspMpc(RearrangementPolicy):
             if self._searched is scene:  # one search a step is enough
                 return False
             self._searched = scene
+            searched = scene
             unfinished = self._unfinished
-            if unfinished is not None and _stands_still(scene, unfinished):
-                scene = unfinished  # the search goes on with what it has found so far
+            if unfinished is not None and _alike(scene, unfinished.scene):
+                if _stands_still(scene, unfinished.scene):
+                    searched = unfinished.scene  # the search goes on with what it has found
+            elif unfinished is not None and unfinished.choice.first is not None:
+                self._unfinished = None
+                return self._begin(scene, unfinished.choice)
             self._choosing = choose_push(
-                scene, self._history, self._executor, self.stop, self.costs
+                searched,
+                self._history,
+                self._executor,
+                self.stop,
+                self.costs,
+                last=self.plan,
+                now=scene.world.time,
             )
         choosing = self._choosing
         if not choosing.fits(scene):
@@ -167,10 +178,36 @@ class GtspMpc(RearrangementPolicy):
             return False
         self._choosing = None
         choice = choosing.call.result()
+        best = choice if choosing.ahead else self._best_so_far(scene, choosing.scene, choice)
+        return best is not None and self._begin(scene, best)
+
+    def _best_so_far(
+        self, scene: PushScene, searched: PushScene, choice: PushChoice
+    ) -> PushChoice | None:
+        """The choice to begin with; None if the robot stands while the search for a better goes on.
+
+        Args:
+            scene: as it is now.
+            searched: for which the choice was made.
+            choice: what has come of it.
+        """
+        before = self._unfinished
         self._unfinished = None
-        if choice.first is None and choice.interrupted and not choosing.ahead:
-            self._unfinished = choosing.scene
-        return self._begin(scene, choice)
+        if not choice.interrupted:
+            return choice
+        now = scene.world.time
+        began = now if before is None else before.began
+        if choice.first is None and before is not None and before.choice.first is not None:
+            choice = before.choice
+        limited = searched.budget.seconds < math.inf
+        pauses = choice.first is not None and limited and now - began < self.config.max_pause
+        if pauses or choice.first is None:
+            self._unfinished = _Unfinished(searched, choice, began)
+        if not pauses:
+            return choice
+        self.graph = choice.graph
+        self.plan = choice.plan
+        return None
 
     def _approach_and_push(self, scene: PushScene) -> Twist | None:
         """The next command of the push in hand; None where there is none, or it has ended."""
@@ -203,7 +240,13 @@ class GtspMpc(RearrangementPolicy):
             expected = scene_after(scene, execution.push)
             if not expected.done.all():
                 self._choosing = choose_push(
-                    expected, self._history, self._executor, self.stop, self.costs, ahead=True
+                    expected,
+                    self._history,
+                    self._executor,
+                    self.stop,
+                    self.costs,
+                    ahead=True,
+                    last=self.plan,
                 )
 
     def _forget_choice(self) -> None:
@@ -285,10 +328,25 @@ class GtspMpc(RearrangementPolicy):
             self._retreats += 1
 
 
+@dataclass(frozen=True, eq=False)
+class _Unfinished:
+    """A decision that its stop rule has interrupted.
+
+    Args:
+        scene: for which it is made, with what was found so far.
+        choice: the best one so far.
+        began: when the first call began, by the clock of the world [s].
+    """
+
+    scene: PushScene
+    choice: PushChoice
+    began: float
+
+
 def _stands_still(one: PushScene, other: PushScene) -> bool:
-    """Return True if neither the robot nor an object has moved between two scenes."""
+    """Return True if the robot has not moved between two scenes."""
     moved = np.abs(one.world.robot_pose - other.world.robot_pose).max()
-    return bool(moved <= _SAME_PLACE * one.size) and _alike(one, other)
+    return bool(moved <= _SAME_PLACE * one.size)
 
 
 def _alike(one: PushScene, other: PushScene) -> bool:

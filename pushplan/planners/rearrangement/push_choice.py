@@ -112,6 +112,8 @@ def choose_push(
     stop: Stop | None,
     costs: Sequence[PushCost] = (),
     ahead: bool = False,
+    last: Sequence[Push] = (),
+    now: float | None = None,
 ) -> PendingChoice:
     """Ask for the best push, or else a recovery path.
 
@@ -122,6 +124,8 @@ def choose_push(
         stop: its stop rule; without one no more pushes than the config allows are simulated.
         costs: terms of a user, which are added to the cost of a push.
         ahead: the scene is still to come.
+        last: the pushes of the last plan, in order.
+        now: time of the world [s]; that of the scene by default.
     """
     history = copy.deepcopy(history)
     config = scene.config
@@ -137,8 +141,10 @@ def choose_push(
         most = math.inf
         if wants_own_budget(rule):
             most = config.max_rollouts
-        scene.budget.start(rule, most)
-        choice = select_push(scene, penalty)
+        scene.budget.start(rule, most, found="first" in scene.progress)
+        choice = select_push(scene, penalty, last)
+        if choice.first is not None:
+            scene.progress["first"] = choice.first
         recovery = None
         if choice.first is None and not scene.budget.stopped:
             recovery = recovery_path(scene.world, 0.5 * MARGIN * size)
@@ -149,7 +155,8 @@ def choose_push(
             searches=scene.cache.searches,
         )
 
-    return PendingChoice(scene, executor.submit(choose, scene.world.time, stop), ahead)
+    began = scene.world.time if now is None else now
+    return PendingChoice(scene, executor.submit(choose, began, stop), ahead)
 
 
 def _checked(cost: PushCost, world: World, push: Push) -> float:
@@ -172,7 +179,11 @@ def scene_after(scene: PushScene, push: Push) -> PushScene:
     return PushScene(moved, scene.config, scene.cache)
 
 
-def select_push(scene: PushScene, penalty: Callable[[Push], float] = lambda _: 0.0) -> PushChoice:
+def select_push(
+    scene: PushScene,
+    penalty: Callable[[Push], float] = lambda _: 0.0,
+    last: Sequence[Push] = (),
+) -> PushChoice:
     """Sequence anew: the pushes to make, and the first of them with the route to it.
 
     Where no push home can be carried out, those that end on the way count as well, and where none
@@ -182,10 +193,11 @@ def select_push(scene: PushScene, penalty: Callable[[Push], float] = lambda _: 0
     Args:
         scene: the scene.
         penalty: what to add to the cost of a push [m].
+        last: the pushes of the last plan, in order.
     """
-    choice = _select(scene, build_push_graph(scene, penalty), penalty)
+    choice = _select(scene, build_push_graph(scene, penalty), penalty, last)
     while scene.budget.next_round():
-        better = _select(scene, build_push_graph(scene, penalty), penalty)
+        better = _select(scene, build_push_graph(scene, penalty), penalty, choice.plan or last)
         if better.first is not None or choice.first is None:
             choice = better
     left = len(scene.left)
@@ -198,11 +210,16 @@ def select_push(scene: PushScene, penalty: Callable[[Push], float] = lambda _: 0
             graph = build_push_graph(
                 scene, penalty, onward=True, relocations=relocations, thorough=thorough
             )
-            choice = _select(scene, graph, penalty)
+            choice = _select(scene, graph, penalty, last)
     return choice
 
 
-def _select(scene: PushScene, graph: PushGraph, penalty: Callable[[Push], float]) -> PushChoice:
+def _select(
+    scene: PushScene,
+    graph: PushGraph,
+    penalty: Callable[[Push], float],
+    last: Sequence[Push],
+) -> PushChoice:
     """The cheapest order, with its first push simulated.
 
     It is simulated on the cheapest path, and if that spoils the push around its object.
@@ -228,7 +245,9 @@ def _select(scene: PushScene, graph: PushGraph, penalty: Callable[[Push], float]
         budget.cost = min(budget.cost, found.cost)
         return found.cost + penalty(push), found.push.delivers
 
-    order = sequence_pushes(graph, simulated_cost, scene.config.max_simulations)
+    order = sequence_pushes(
+        graph, simulated_cost, scene.config.max_simulations, budget.time_limit, last
+    )
     plan = tuple(graph.pushes[n] for n in order)
     return PushChoice(graph, plan, known[order[0]] if order else None)
 

@@ -16,7 +16,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from itertools import combinations, pairwise
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -60,11 +60,34 @@ class GtspReduction:
         costs: (M, M) arcs between nodes, node 0 is the robot.
         clusters: nodes of each object, in order, and last that of the robot.
         pushes: (M,) index of the push that each node stands for, -1 for the robot.
+        chains: the nodes of each part of each push.
     """
 
     costs: FloatArray
     clusters: list[list[int]]
     pushes: list[int]
+    chains: list[list[int]]
+
+    def tour(self, order: Sequence[int]) -> list[int] | None:
+        """The closed tour that makes pushes in an order, each for what is left when it comes.
+
+        Returns:
+            Nodes; None if pushes are missing or may not follow each other.
+        """
+        chains: dict[int, list[list[int]]] = {}
+        for chain in sorted(self.chains, key=len, reverse=True):
+            chains.setdefault(self.pushes[chain[0]], []).append(chain)
+        owners = {node: c for c, nodes in enumerate(self.clusters) for node in nodes}
+        left = set(range(len(self.clusters) - 1))
+        found = [0]
+        for n in order:
+            for chain in chains.get(n, []):
+                served = {owners[node] for node in chain}
+                if served <= left:
+                    left -= served
+                    found += chain
+        drives = np.isfinite(self.costs[found, np.roll(found, -1)]).all()
+        return found if drives and not left else None
 
     def order(self, nodes: list[int]) -> list[int]:
         """The pushes along a closed tour over nodes, from the robot on."""
@@ -84,9 +107,7 @@ def reduce_to_gtsp(costs: FloatArray, masks: list[int], objects: int) -> GtspRed
         masks: what each push delivers, one bit an object.
         objects: how many objects there are.
     """
-    firsts = []
-    lasts = []
-    chains = []
+    chains: list[list[int]] = []
     clusters: list[list[int]] = [[] for _ in range(objects)]
     owners = [-1]
     count = 1
@@ -98,19 +119,19 @@ def reduce_to_gtsp(costs: FloatArray, masks: list[int], objects: int) -> GtspRed
             for node, b in zip(nodes, part, strict=True):
                 clusters[b].append(node)
             owners += [n] * len(part)
-            firsts.append(nodes[0])
-            lasts.append(nodes[-1])
-            chains += list(pairwise(nodes))
+            chains.append(nodes)
             count += len(part)
     out = np.full((count, count), np.inf)
+    firsts = [nodes[0] for nodes in chains]
+    lasts = [nodes[-1] for nodes in chains]
     which = np.array([owners[node] for node in firsts], dtype=np.int64)
     if len(which):
         out[np.ix_(lasts, firsts)] = costs[np.ix_(which, which)]
         out[0, firsts] = costs[-1, which]
         out[lasts, 0] = 0.0
-    for a, b in chains:
-        out[a, b] = 0.0
-    return GtspReduction(out, [*clusters, [0]], owners)
+    for nodes in chains:
+        out[nodes[:-1], nodes[1:]] = 0.0
+    return GtspReduction(out, [*clusters, [0]], owners, chains)
 
 
 def parts_of(mask: int) -> list[tuple[int, ...]]:

@@ -132,12 +132,12 @@ class PushScene:
             )
         )
 
-    def with_objects_at(self, poses: FloatArray) -> PushScene:
+    def with_objects_at(self, poses: FloatArray, cache: RolloutCache | None = None) -> PushScene:
         """The same with the objects at poses (K, 3), as far as rolling out pushes goes.
 
         The world, and with it where the robot is, stays as it is.
         """
-        moved = self._changed(poses=np.ascontiguousarray(poses), cache=None)
+        moved = self._changed(poses=np.ascontiguousarray(poses), cache=cache)
         for name in ("done", "remaining_now", "fine", "coarse", "starts"):
             moved.__dict__.pop(name, None)
         return moved

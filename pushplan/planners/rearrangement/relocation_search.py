@@ -29,7 +29,7 @@ from pushplan.planners.rearrangement.candidates import GAIN
 from pushplan.planners.rearrangement.push_scene import PushScene, pose_distance
 from pushplan.planners.rearrangement.push_starts import initial_heading
 from pushplan.planners.rearrangement.pushability import MARGINS, can_be_pushed, failing_margins
-from pushplan.planners.rearrangement.rollout_cache import Primitive
+from pushplan.planners.rearrangement.rollout_cache import Primitive, RolloutCache
 from pushplan.world.checks import FloatArray
 
 _Cell = tuple[float, ...]
@@ -140,6 +140,7 @@ class RelocationSearch:
         self._expansions = 0
         self._sides = Counter[_Cell]()
         self._alike = Counter[_Cell]()
+        self._interrupted_rollouts = RolloutCache()
         self.interrupted = True
 
     def run(self) -> list[Primitive]:
@@ -216,9 +217,11 @@ class RelocationSearch:
             side = self._side(state)
             place = self._place(state)
             if self._sides[side] < most and place not in self._failing:
-                failing = failing_margins(scene, k, state.poses, self._horizon)
+                cache = self._interrupted_rollouts if scene.budget.has_rule else None
+                failing = failing_margins(scene, k, state.poses, self._horizon, cache)
                 if scene.budget.is_over:
                     return
+                self._interrupted_rollouts = RolloutCache()
                 self._failing[place] = failing
             stands = most - self._failing.get(place, most)
             self._sides[side] = max(self._sides[side], stands)

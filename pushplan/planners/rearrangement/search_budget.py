@@ -39,13 +39,14 @@ class SearchBudget:
     def __init__(self) -> None:
         self.start(None, math.inf)
 
-    def start(self, stop: Stop | None, most: float) -> None:
+    def start(self, stop: Stop | None, most: float, found: bool = False) -> None:
         """Begin a search, or go on with one.
 
         Args:
             stop: its stop rule; None for no end.
             most: after so many simulated pushes no further ones are looked for; after `_HARDEST`
                 times as many the search is over.
+            found: a first push is known, so that the whole time is for better ones.
         """
         self._check: StopCheck | None = None if stop is None else stop.start()
         self.seconds = math.inf if stop is None else stop.seconds
@@ -57,8 +58,13 @@ class SearchBudget:
         self.interrupted = False
         self.stopped = False
         self._part_began = 0
-        self._round = 0
+        self._round = len(_ROUNDS) - 1 if found else 0
         self._late = False
+
+    @property
+    def has_rule(self) -> bool:
+        """True if a stop rule may end the search at any time."""
+        return self._check is not None
 
     @property
     def is_over(self) -> bool:
@@ -80,6 +86,16 @@ class SearchBudget:
         """True if the round is to go on with estimates of the approaches between pushes."""
         return self.is_over or self._is_late(1)
 
+    @property
+    def time_limit(self) -> Stop | None:
+        """A rule that ends another solver when the search has to return; None without a limit."""
+        return _TimeLimit(self) if self.seconds < math.inf else None
+
+    @property
+    def left_s(self) -> float:
+        """What is left of a time limit [s]."""
+        return max(self.seconds - self._elapsed, 0.0)
+
     def next_round(self) -> bool:
         """Begin another round; False if the last one left nothing out, or it was the last."""
         again = self._late and not self.is_over and self._round + 1 < len(_ROUNDS)
@@ -99,8 +115,7 @@ class SearchBudget:
             seconds: that it takes, roughly. One that takes longer than what is left waits for the
                 beginning of the next decision.
         """
-        left = self.seconds - self._elapsed
-        if self.is_over or (seconds > left and self._elapsed > _BEGINNING * self.seconds):
+        if self.is_over or (seconds > self.left_s and self._elapsed > _BEGINNING * self.seconds):
             self._over = self.interrupted = self.stopped = True
         return not self._over
 
@@ -124,3 +139,19 @@ class SearchBudget:
             self.interrupted = True
             return True
         return False
+
+
+class _TimeLimit(Stop):
+    """Fires when a decision has to return."""
+
+    def __init__(self, budget: SearchBudget) -> None:
+        self._budget = budget
+
+    @property
+    def seconds(self) -> float:
+        """What is left for the decision [s]."""
+        return self._budget.left_s
+
+    def start(self) -> StopCheck:
+        """Arm the rule: the time of the decision runs already."""
+        return lambda iterations, cost: self._budget.is_over
