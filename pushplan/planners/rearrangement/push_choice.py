@@ -35,6 +35,8 @@ _ROBOT_OFF = 0.5
 _OBJECT_OFF = 0.2
 """Greatest distances from the predicted poses in a scene that a choice is still good for
 [circumscribed radii]."""
+_RECOVERY_S = 0.05
+"""Time that a path out of a tight place takes, roughly [s]."""
 _NEAREST = 2
 """For so many objects, the nearest ones, relocations are looked for at first."""
 
@@ -135,6 +137,9 @@ def choose_push(
     def penalty(push: Push) -> float:
         return history.penalty(push, config) * size + sum(term(push) for term in terms)
 
+    def way_out() -> FloatArray | None:
+        return recovery_path(scene.world, 0.5 * MARGIN * size)
+
     def choose(rule: Stop | None) -> PushChoice:
         assert scene.cache is not None
         scene.cache.age()
@@ -142,12 +147,17 @@ def choose_push(
         if wants_own_budget(rule):
             most = config.max_rollouts
         scene.budget.start(rule, most, found="first" in scene.progress)
+        if "no push" in scene.progress:
+            scene.known("recovery", way_out)
         choice = select_push(scene, penalty, last)
         if choice.first is not None:
             scene.progress["first"] = choice.first
         recovery = None
         if choice.first is None and not scene.budget.stopped:
-            recovery = recovery_path(scene.world, 0.5 * MARGIN * size)
+            if "recovery" in scene.progress or scene.budget.has_room(_RECOVERY_S):
+                recovery = scene.known("recovery", way_out)
+            else:
+                scene.progress["no push"] = True
         return replace(
             choice,
             recovery=recovery,

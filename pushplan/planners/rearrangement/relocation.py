@@ -55,6 +55,10 @@ def relocating_pushes(
             return []
         if cache is not None and not search.interrupted:
             cache.keep_relocations(int(movables.ids[k]), asked, found)
+    key = "relocating", k, thorough
+    known, pushes = scene.progress.get(key, (None, []))
+    if known is found:
+        return list(pushes)
     pushes = []
     for path, extra, moved in found:
         poses = scene.poses.copy()
@@ -62,4 +66,5 @@ def relocating_pushes(
             poses[movables.ids == number] = pose
         for push in simulate_primitive(scene, path, k, poses):
             pushes.append(replace(push, cost=push.cost + extra))
-    return pushes
+    scene.progress[key] = found, pushes
+    return list(pushes)
