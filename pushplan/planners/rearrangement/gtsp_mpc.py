@@ -31,6 +31,7 @@ from pushplan.world.checks import FloatArray, expect
 _SAME_OBJECTS = 0.05  # objects have not moved if all by less [circumscribed radii]
 _SAME_PLACE = 0.02  # the robot has not moved if by less [circumscribed radii, rad]
 _MOST_ENDS = 4  # pushes and recoveries that may end in one step until the robot waits
+_COLLECTING = 0.5  # part of a pause in which pushes are simulated and no order is made
 _RETREAT = 0.3  # distance that the robot backs off where it makes no progress [circumscribed radii]
 
 
@@ -169,6 +170,8 @@ class GtspMpc(RearrangementPolicy):
                 self.costs,
                 last=self.plan,
                 now=scene.world.time,
+                collect=unfinished is not None
+                and scene.world.time - unfinished.began < _COLLECTING * self.config.max_pause,
             )
         choosing = self._choosing
         if not choosing.fits(scene):
@@ -199,8 +202,8 @@ class GtspMpc(RearrangementPolicy):
         began = now if before is None else before.began
         if choice.first is None and before is not None and before.choice.first is not None:
             choice = before.choice
-        limited = searched.budget.seconds < math.inf
-        pauses = choice.first is not None and limited and now - began < self.config.max_pause
+        late = searched.budget.out_of_time
+        pauses = choice.first is not None and late and now - began < self.config.max_pause
         if pauses or choice.first is None:
             self._unfinished = _Unfinished(searched, choice, began)
         if not pauses:

@@ -116,6 +116,7 @@ def choose_push(
     ahead: bool = False,
     last: Sequence[Push] = (),
     now: float | None = None,
+    collect: bool = False,
 ) -> PendingChoice:
     """Ask for the best push, or else a recovery path.
 
@@ -128,6 +129,7 @@ def choose_push(
         ahead: the scene is still to come.
         last: the pushes of the last plan, in order.
         now: time of the world [s]; that of the scene by default.
+        collect: where a choice is known for the scene, only simulate further pushes.
     """
     history = copy.deepcopy(history)
     config = scene.config
@@ -146,12 +148,18 @@ def choose_push(
         most = math.inf
         if wants_own_budget(rule):
             most = config.max_rollouts
-        scene.budget.start(rule, most, found="first" in scene.progress)
+        known: PushChoice | None = scene.progress.get("choice")
+        collects = collect and known is not None
+        scene.budget.start(rule, most, found=known is not None, collects=collects)
+        if known is not None and collects:
+            scene.progress["delivering"].fill(scene.budget)
+            if scene.budget.out_of_time:
+                return replace(known, interrupted=True)
         if "no push" in scene.progress:
             scene.known("recovery", way_out)
         choice = select_push(scene, penalty, last)
         if choice.first is not None:
-            scene.progress["first"] = choice.first
+            scene.progress["choice"] = choice
         recovery = None
         if choice.first is None and not scene.budget.stopped:
             if "recovery" in scene.progress or scene.budget.has_room(_RECOVERY_S):

@@ -123,7 +123,7 @@ class RearrangementConfig(CheckedFields):
     max_simulations: Annotated[int, Limits(1, 1000)] = 30
     max_rollouts: PositiveInt = 1000
     max_searches: PositiveInt = 6
-    max_pause: NonNegativeFloat = 2.0
+    max_pause: NonNegativeFloat = 3.0
     response: Annotated[float, Limits(0.0, 1e3, open_low=True)] = 0.2
     mpc: bool = True
     max_failures: PositiveInt = 3

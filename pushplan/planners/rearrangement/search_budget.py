@@ -15,9 +15,10 @@ to the end of one at least and the next decision need not begin with it again.""
 
 
 _ROUNDS = ((0.3, 0.3), (0.6, 0.85))
+_COLLECTING = 0.95
 """Rounds of a decision with a time limit: fractions of it after which no further pushes are
 simulated, and after which approaches between pushes are estimated. The rest of a round is for the
-order and the first push with its approach."""
+order and the first push with its approach. A decision that only collects pushes has one part."""
 _BEGINNING = 0.1
 """Fraction of a time limit up to which a long step begins however long it is."""
 
@@ -34,12 +35,15 @@ class SearchBudget:
         seconds: time limit of the stop rule; inf if it has none.
         stopped: the time is up, so that not even a first push is looked for. Rules that count let
             it be found.
+        out_of_time: a time limit has left something out.
     """
 
     def __init__(self) -> None:
         self.start(None, math.inf)
 
-    def start(self, stop: Stop | None, most: float, found: bool = False) -> None:
+    def start(
+        self, stop: Stop | None, most: float, *, found: bool = False, collects: bool = False
+    ) -> None:
         """Begin a search, or go on with one.
 
         Args:
@@ -47,6 +51,7 @@ class SearchBudget:
             most: after so many simulated pushes no further ones are looked for; after `_HARDEST`
                 times as many the search is over.
             found: a first push is known, so that the whole time is for better ones.
+            collects: the whole time is for simulating pushes.
         """
         self._check: StopCheck | None = None if stop is None else stop.start()
         self.seconds = math.inf if stop is None else stop.seconds
@@ -59,7 +64,9 @@ class SearchBudget:
         self.stopped = False
         self._part_began = 0
         self._round = len(_ROUNDS) - 1 if found else 0
+        self._collects = collects
         self._late = False
+        self.out_of_time = False
 
     @property
     def has_rule(self) -> bool:
@@ -73,6 +80,7 @@ class SearchBudget:
             stopped = self._check is not None and self._check(self.used, self.cost)
             self._over = stopped or self.used >= _HARDEST * self._most
             self.stopped = stopped and self.seconds < math.inf
+            self.out_of_time |= self.stopped
             self.interrupted |= self._over
         return self._over
 
@@ -104,8 +112,9 @@ class SearchBudget:
         return again
 
     def _is_late(self, part: int) -> bool:
-        if self._elapsed >= _ROUNDS[self._round][part] * self.seconds:
-            self._late = self.interrupted = True
+        fraction = _COLLECTING if self._collects else _ROUNDS[self._round][part]
+        if self._elapsed >= fraction * self.seconds:
+            self._late = self.interrupted = self.out_of_time = True
         return self._late
 
     def has_room(self, seconds: float) -> bool:
@@ -116,7 +125,7 @@ class SearchBudget:
                 beginning of the next decision.
         """
         if self.is_over or (seconds > self.left_s and self._elapsed > _BEGINNING * self.seconds):
-            self._over = self.interrupted = self.stopped = True
+            self._over = self.interrupted = self.stopped = self.out_of_time = True
         return not self._over
 
     @property
