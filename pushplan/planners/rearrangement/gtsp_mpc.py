@@ -32,6 +32,7 @@ _SAME_OBJECTS = 0.05  # objects have not moved if all by less [circumscribed rad
 _SAME_PLACE = 0.02  # the robot has not moved if by less [circumscribed radii, rad]
 _MOST_ENDS = 4  # pushes and recoveries that may end in one step until the robot waits
 _COLLECTING = 0.5  # part of a pause in which pushes are simulated and no order is made
+_SETTLING = 0.5  # time after which a robot that pauses stands, unless what it sees is noisy [s]
 _RETREAT = 0.3  # distance that the robot backs off where it makes no progress [circumscribed radii]
 
 
@@ -156,12 +157,15 @@ class GtspMpc(RearrangementPolicy):
             self._searched = scene
             searched = scene
             unfinished = self._unfinished
-            if unfinished is not None and _alike(scene, unfinished.scene):
+            if unfinished is not None:
                 if _stands_still(scene, unfinished.scene):
                     searched = unfinished.scene  # the search goes on with what it has found
-            elif unfinished is not None and unfinished.choice.first is not None:
-                self._unfinished = None
-                return self._begin(scene, unfinished.choice)
+                elif (
+                    unfinished.choice.first is not None
+                    and scene.world.time - unfinished.began > _SETTLING
+                ):
+                    self._unfinished = None
+                    return self._begin(scene, unfinished.choice)
             self._choosing = choose_push(
                 searched,
                 self._history,
@@ -347,9 +351,9 @@ class _Unfinished:
 
 
 def _stands_still(one: PushScene, other: PushScene) -> bool:
-    """Return True if the robot has not moved between two scenes."""
+    """Return True if neither the robot nor an object has moved between two scenes."""
     moved = np.abs(one.world.robot_pose - other.world.robot_pose).max()
-    return bool(moved <= _SAME_PLACE * one.size)
+    return bool(moved <= _SAME_PLACE * one.size) and _alike(one, other)
 
 
 def _alike(one: PushScene, other: PushScene) -> bool:

@@ -12,13 +12,11 @@ _HARDEST = 10
 _PART = 5
 """Budgets for one of them: less than are left when the first begins, so that each decision gets
 to the end of one at least and the next decision need not begin with it again."""
-
-
 _ROUNDS = ((0.3, 0.3), (0.6, 0.85))
-_COLLECTING = 0.95
 """Rounds of a decision with a time limit: fractions of it after which no further pushes are
 simulated, and after which approaches between pushes are estimated. The rest of a round is for the
-order and the first push with its approach. A decision that only collects pushes has one part."""
+order and the first push with its approach."""
+_COLLECTING = 0.95  # the same fractions where the decision only collects pushes
 _BEGINNING = 0.1
 """Fraction of a time limit up to which a long step begins however long it is."""
 
