@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import copy
 import math
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -31,6 +32,8 @@ from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.planners.rearrangement.search_budget import SearchBudget
 from pushplan.world import Movables, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
+
+T = TypeVar("T")
 
 # Lengths are in circumscribed radii of the robot.
 _GOAL_SLACK = 0.012
@@ -60,6 +63,8 @@ MARGIN = 0.03
 """Distance that approaches keep from what is static."""
 _LEAST_MARGIN = 0.3 * MARGIN
 """Distance from what is static that the robot keeps wherever it is placed."""
+_POSE_S = 6e-7
+"""Time that a pose of the lattice takes [s]."""
 _TURN_COST = 0.03
 """Cost of a turn by one radian on the spot, so that needless ones are left out."""
 
@@ -95,8 +100,26 @@ class PushScene:
     def _changed(self, **values: Any) -> PushScene:
         """The same with other fields, or with other values of what is worked out from them."""
         other = copy.copy(self)
+        other.__dict__.pop("progress", None)
         other.__dict__.update(values)
         return other
+
+    @cached_property
+    def progress(self) -> dict[Hashable, Any]:
+        """What decisions for this scene have worked out: an interrupted one is gone on with."""
+        return {}
+
+    def known(self, key: Hashable, make: Callable[[], T]) -> T:
+        """What `make` gives, made once for the scene."""
+        if key not in self.progress:
+            self.progress[key] = make()
+        found: T = self.progress[key]
+        return found
+
+    @property
+    def finer_lattice_s(self) -> float:
+        """Time that it takes to make that lattice and to search it, roughly [s]."""
+        return 0.0 if "finer" in self.progress else _POSE_S * 4.0 * self.fine.grid.blocked.size
 
     def on_finer_lattice(self) -> PushScene:
         """The same with approaches on half the cells, that keep little distance from walls."""
@@ -112,12 +135,12 @@ class PushScene:
             )
         )
 
-    def with_objects_at(self, poses: FloatArray) -> PushScene:
+    def with_objects_at(self, poses: FloatArray, cache: RolloutCache | None = None) -> PushScene:
         """The same with the objects at poses (K, 3), as far as rolling out pushes goes.
 
         The world, and with it where the robot is, stays as it is.
         """
-        moved = self._changed(poses=np.ascontiguousarray(poses), cache=None)
+        moved = self._changed(poses=np.ascontiguousarray(poses), cache=cache)
         for name in ("done", "remaining_now", "fine", "coarse", "starts"):
             moved.__dict__.pop(name, None)
         return moved
