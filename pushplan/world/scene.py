@@ -14,8 +14,6 @@ from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, Shape
 from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray
 from pushplan.world.goals import (
     Goal,
-    GoalDisc,
-    GoalLine,
     ManipulationGoal,
     NavigationGoal,
 )
@@ -65,7 +63,7 @@ class World(ArrayRecord, CheckedFields):
         super().__post_init__()
         if not isinstance(self.goal, Goal):
             raise InvalidInputError(
-                "world.goal must be a GoalDisc, GoalLine, Receptacle or ClearanceArea, "
+                "world.goal must be a GoalDisc, GoalPose, GoalLine, Receptacle or ClearanceArea, "
                 f"got {type(self.goal).__name__}"
             )
 
@@ -85,7 +83,7 @@ class World(ArrayRecord, CheckedFields):
         """
         if not isinstance(self.goal, NavigationGoal):
             raise InvalidInputError(
-                "this needs a goal for the robot (GoalDisc or GoalLine), "
+                "this needs a goal for the robot (GoalDisc, GoalPose or GoalLine), "
                 f"got {type(self.goal).__name__}"
             )
         return self.goal
@@ -128,9 +126,8 @@ class World(ArrayRecord, CheckedFields):
     @property
     def goal_reached(self) -> bool:
         """True if the robot, or every object, is where the goal wants it."""
-        if isinstance(self.goal, GoalDisc | GoalLine):
-            x, y, _ = self.robot_pose.tolist()
-            return self.goal.distance(x, y) == 0.0
+        if isinstance(self.goal, NavigationGoal):
+            return self.goal.reached_by(self.robot_pose)
         return bool(self.completed.all())
 
     def robot_outline_world(self) -> tuple[FloatArray, ...]:
