@@ -14,6 +14,7 @@ from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, Shape
 from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray
 from pushplan.world.goals import (
     Goal,
+    GoalPose,
     ManipulationGoal,
     NavigationGoal,
 )
@@ -87,6 +88,20 @@ class World(ArrayRecord, CheckedFields):
                 f"got {type(self.goal).__name__}"
             )
         return self.goal
+
+    @property
+    def place_goal(self) -> NavigationGoal:
+        """The goal, where it is one for the robot itself that says nothing of its heading.
+
+        Raises:
+            InvalidInputError: if it is another one.
+        """
+        if isinstance(self.goal, GoalPose):
+            raise InvalidInputError(
+                "this goes to a GoalDisc or GoalLine at any heading, got a GoalPose; plan with "
+                "straight, kinodynamic-rrt or push-aware"
+            )
+        return self.navigation_goal
 
     @property
     def manipulation_goal(self) -> ManipulationGoal:
