@@ -6,7 +6,8 @@
 
 namespace pushplan::bindings {
 
-/// A goal as `goal_numbers` of Python gives it.
+/// A goal as `goal_numbers` of Python gives it; 2 is a disc whose heading a path curves into, 3 one
+/// where it turns to it.
 inline GoalRegion goal_region(const Numbers<5>& numbers) {
   const double* n = numbers.data();
   if (n[0] >= 2.0) {

@@ -68,12 +68,14 @@ def path_end(
     begin = behind(goal, straight)
     near = 0.0 if straight else _IN_PLACE * goal.radius
     last = np.array([[straight, 0.0]])
-    for on_spot, back in product((True, False) if turns_at_end(robot) else (False,), _BACK):
+    kinds = [True, False] if turns_at_end(robot) else [False]
+    for on_spot, back in product(kinds, _BACK):
         places = np.unique(np.searchsorted(along, along[-1] - radius * np.array(back)))
         curves = [(k, _curve(path[k], begin, radius, on_spot, near)) for k in places.tolist()]
         curves.sort(key=lambda found: float(along[found[0]] + np.abs(found[1][:, 0]).sum()))
         for k, curve in curves:
-            for pieces in _turned(goal, path[k], curve) if on_spot else [curve]:
+            ways = _turned(goal, path[k], curve) if on_spot else iter([curve])
+            for pieces in ways:
                 poses, curvatures = _laid_out(path[k], np.vstack([pieces, last]), spacing)
                 if checker.first_blocked(poses) == len(poses):
                     return PathEnd(k + 1, poses, curvatures)
@@ -95,7 +97,9 @@ def run_up(world: World, goal: GoalPose, radius: float) -> float:
     size = robot.circumscribed_radius
     walls = obstacles(keep_out(world))
     checker = core.CollisionChecker(footprint(robot), walls)
-    room = _ROOM * size if turns_at_end(robot) else max(_ROOM * size, radius)
+    room = _ROOM * size
+    if not turns_at_end(robot):
+        room = max(room, radius)
     for steps in range(int(_RUN_UP / _STEP)):
         length = steps * _STEP * size
         pose = behind(goal, length)

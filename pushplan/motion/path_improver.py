@@ -76,14 +76,17 @@ class PathImprover:
     ) -> None:
         world = call.world
         self.given = world
+        """The scene with its own goal."""
         self.pose_goal = world.goal if isinstance(world.goal, GoalPose) else None
         """A goal with a heading; searches of `world` lead to where the end of a path begins."""
         self._straight = 0.0
         if self.pose_goal is not None:
             self._straight = run_up(world, self.pose_goal, turning_radius)
-            size = world.robot.circumscribed_radius if self._straight else self.pose_goal.radius
+            near = self.pose_goal.radius
+            if self._straight:
+                near = world.robot.circumscribed_radius
             place = behind(self.pose_goal, self._straight)[:2]
-            world = replace(world, goal=GoalDisc(place, _NEAR * size))
+            world = replace(world, goal=GoalDisc(place, _NEAR * near))
         self.world = world
         self.config = config
         self.rng = call.rng
@@ -107,8 +110,9 @@ class PathImprover:
         )
         self._goal_of_paths = self.room.goal
         if self.pose_goal is not None:
-            kind = 3.0 if turns_at_end(world.robot) and not self._straight else 2.0
-            self._goal_of_paths = np.array([kind, *self.room.goal[1:4], self.pose_goal.heading])
+            turns = turns_at_end(world.robot) and not self._straight
+            place = self.room.goal[1:4]
+            self._goal_of_paths = np.array([2.0 + turns, *place, self.pose_goal.heading])
         # crowded worlds are slow to sweep: look at the stop rule more often
         self._batch = max(1, 10 * BATCH // (10 + len(world.movables)))
         self._call = call
