@@ -59,7 +59,7 @@ def path_end(
         radius: least turning radius [m].
         spacing: greatest distance between two poses [m].
         checker: of the footprint among what is static.
-        straight: length of a straight last piece, from `run_up` [m].
+        straight: length of a straight last piece, from `run_up` [m]; negative for back.
 
     Returns:
         The end, or None where there is none.
@@ -85,8 +85,9 @@ def path_end(
 def run_up(world: World, goal: GoalPose, radius: float) -> float:
     """The shortest straight way into a goal pose from where the robot has room to turn [m].
 
-    A differential drive has room where it can turn on the spot, another one where a circle of its
-    least turning radius fits. It is 0 where there is room at the goal, or nowhere behind it.
+    A differential drive has room where it can turn on the spot, another one where a disc is free
+    that is larger than the robot by its least turning radius. It is 0 where there is room at the goal, or no such way, and negative
+    for one that is driven back, by a robot that may.
 
     Args:
         world: the scene.
@@ -99,14 +100,16 @@ def run_up(world: World, goal: GoalPose, radius: float) -> float:
     checker = core.CollisionChecker(footprint(robot), walls)
     room = _ROOM * size
     if not turns_at_end(robot):
-        room = max(room, radius)
+        room = radius + size
+    ways = [1.0, -1.0] if robot.min_speed < 0.0 else [1.0]
     for steps in range(int(_RUN_UP / _STEP)):
-        length = steps * _STEP * size
-        pose = behind(goal, length)
-        if not checker.is_free(pose):
-            break
-        if walls.can_turn(pose[0], pose[1], room):
-            return length
+        for way in list(ways):
+            length = way * steps * _STEP * size
+            pose = behind(goal, length)
+            if not checker.is_free(pose):
+                ways.remove(way)
+            elif walls.can_turn(pose[0], pose[1], room):
+                return length
     return 0.0
 
 

@@ -45,7 +45,8 @@ def room(heading, drive="differential", walls=(), **other):
         "movables": Movables.empty(),
         "goal": GoalPose([6, 6], TOLERANCES[0], heading, TOLERANCES[1]),
     }
-    return World(robot(drive), static=static, **{"robot_pose": [6.0, 2.0, 0.3]} | parts | other)
+    parts = {"robot": robot(drive), **parts}
+    return World(static=static, **{"robot_pose": [6.0, 2.0, 0.3]} | parts | other)
 
 
 def plan(world, planner="kinodynamic-rrt", iterations=3000):
@@ -83,6 +84,23 @@ def test_without_room_to_turn_a_curve_leads_into_the_pose(planner):
     last = found.stages[-1]
     turned = np.abs(np.diff(found.poses[last.first : last.last + 1, 2])).sum()
     assert last.direction == 1 or turned < 0.1
+
+
+@pytest.mark.parametrize("drive", ["differential", "car"])
+@pytest.mark.parametrize("planner", ["kinodynamic-rrt", "push-aware"])
+def test_a_robot_that_may_reverse_backs_into_a_dock(planner, drive):
+    closed = [[6.35, 5.6], [6.45, 5.6], [6.45, 6.4], [6.35, 6.4]]
+    dock = [
+        [[5.3, 5.66], [6.4, 5.66], [6.4, 5.76], [5.3, 5.76]],
+        [[5.3, 6.24], [6.4, 6.24], [6.4, 6.34], [5.3, 6.34]],
+    ]
+    world = room(math.pi, walls=[closed, *dock], robot=robot(drive, min_speed=-0.3))
+    status, found = plan(world, planner, 6000)
+    assert status is PlanStatus.SOLVED
+    assert world.goal.reached_by(found.poses[-1])
+    assert found.stages[-1].direction == -1
+    checker = core.CollisionChecker(footprint(world.robot), obstacles(world.static))
+    assert checker.first_blocked(found.poses) == len(found.poses)
 
 
 @pytest.mark.parametrize("planner", ["straight", "kinodynamic-rrt", "push-aware"])
