@@ -82,8 +82,7 @@ class _GuidedDrive:
             if improver.stopped():
                 return False
             if fault == self._count:
-                improver.keep(self._path, self._count, cost)
-                return True
+                return self._arrives(cost)
             along = arc_lengths(self._path.poses[: self._count, :2])
             if along[fault] > reached + improver.size:
                 level = 0
@@ -96,6 +95,19 @@ class _GuidedDrive:
                 level += 1
             self._follow_guide()
         return False
+
+    def _arrives(self, cost: float) -> bool:
+        """Keep the path, with the heading of the goal at its end; True if that is a plan."""
+        improver = self._improver
+        ended = improver.ended(self._path, self._count)
+        if ended is None:
+            return False
+        path, count = ended
+        if path is not self._path:
+            found = improver.sweep(path, count, improver.jam_cost)
+            cost = np.inf if found is None else found
+        improver.keep(path, count, cost)
+        return improver.solved
 
     def _append(self, tail: SweptPath, count: int, first: int = 0) -> None:
         """Add poses ``first`` to ``count`` of a path, of which objects are not known."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
 
@@ -12,6 +12,7 @@ from pushplan.core import motion as core
 from pushplan.interaction import InteractionModel
 from pushplan.interaction.compiled_model import SweptModel, compile_interaction
 from pushplan.motion.collision import footprint, obstacles
+from pushplan.motion.goal_approach import behind, path_end, run_up, turns_at_end
 from pushplan.motion.goal_region import goal_numbers
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_search_config import (
@@ -26,7 +27,7 @@ from pushplan.motion.room_ahead import Room
 from pushplan.motion.speed_profile import TIGHTEST, goal_is_outside, start_margin, timed_plan
 from pushplan.motion.swept_path import SweptPath, make_swept_path
 from pushplan.motion.time_slicing import Pace
-from pushplan.world import Drive, PlanResult, PlanStatus
+from pushplan.world import Drive, GoalDisc, GoalPose, PlanResult, PlanStatus
 from pushplan.world.checks import FloatArray
 from pushplan.world.planning_call import PlanningCall
 
@@ -35,6 +36,9 @@ _THIN_MARGIN = 0.05
 _LEAST_SPACING = 0.02  # least spacing for that reason [R]
 _LESS_MARGIN = 0.4  # of the margin is kept where plans fail with it
 _NO_MARGIN = 0.01  # a margin as small is given up then [R]
+_NEAR = 0.5
+"""Radius of the disc at a goal pose to which searches lead [tolerance of the place], or at the
+beginning of a straight way into it [R]."""
 _BEYOND = 1e4  # times the way around the workspace with everything in tow: no path is as long
 ENDLESS = 2**62
 """A limit of the tests of a sweep that is none."""
@@ -72,6 +76,18 @@ class PathImprover:
         turning_radius: float,  # least one of plans at first [m]
     ) -> None:
         world = call.world
+        self.given = world
+        """The scene with its own goal."""
+        self.pose_goal = world.goal if isinstance(world.goal, GoalPose) else None
+        """A goal with a heading; searches of `world` lead to where the end of a path begins."""
+        self._straight = 0.0
+        if self.pose_goal is not None:
+            self._straight = run_up(world, self.pose_goal, turning_radius)
+            near = self.pose_goal.radius
+            if self._straight:
+                near = world.robot.circumscribed_radius
+            place = behind(self.pose_goal, self._straight)[:2]
+            world = replace(world, goal=GoalDisc(place, _NEAR * near))
         self.world = world
         self.config = config
         self.rng = call.rng
@@ -94,6 +110,11 @@ class PathImprover:
             goal_numbers(self.goal, INSET * self.size),
             SPACING * self.size,
         )
+        self._goal_of_paths = self.room.goal
+        if self.pose_goal is not None:
+            turns = turns_at_end(world.robot) and not self._straight
+            place = self.room.goal[1:4]
+            self._goal_of_paths = np.array([2.0 + turns, *place, self.pose_goal.heading])
         # crowded worlds are slow to sweep: look at the stop rule more often
         self._batch = max(1, 10 * BATCH // (10 + len(world.movables)))
         self._call = call
@@ -107,16 +128,23 @@ class PathImprover:
         margin = start_margin(self.world, self.config.margin * self.size)
         if margin is None:
             return PlanStatus.START_BLOCKED
-        if goal_is_outside(self.world):
+        if goal_is_outside(self.given):
             return PlanStatus.GOAL_UNREACHABLE
+        goal = self.pose_goal
+        if goal is not None:
+            margin = start_margin(self.world, margin, goal.pose)
+            if margin is None:
+                return PlanStatus.GOAL_UNREACHABLE
         self._set_margin(margin)
-        if self.goal.distance(*self.world.robot_pose[:2]) <= 0.0:
+        if self.given.goal_reached:
             here = make_swept_path(1, len(self.world.movables))
             here.poses[0] = self.world.robot_pose
             here.objects[0] = self.world.movables.poses
             self.keep(here, 1, 0.0)
             return PlanStatus.SOLVED
-        return None
+        if goal is not None and goal.distance(*self.world.robot_pose[:2]) == 0.0:
+            self.candidate(np.empty((0, 2)), self.jam_cost)  # it only has to turn
+        return PlanStatus.SOLVED if self.solved else None
 
     def begin_with(self, lead: Lead | None) -> None:
         """Begin all paths with some arcs, from the next search on; None begins at the robot."""
@@ -170,7 +198,7 @@ class PathImprover:
             spacing=room.spacing,
             jam_length=self._jam_length,
             displacement=1.5 * self.size,
-            goal=room.goal,
+            goal=self._goal_of_paths,
             footprint=room.footprint,
             walls=room.walls,
         )
@@ -201,8 +229,14 @@ class PathImprover:
         arcs: FloatArray,  # (E, 2) length [m] and curvature [1/m], from the end of the lead on
         limit: float = np.inf,  # cost that it must stay below [kg m]
     ) -> Candidate | None:
-        """The path along some arcs, free of walls, with its cost; None where it costs too much."""
-        path, used = self._along(arcs, 3)
+        """The path along some arcs, free of walls, with its cost; None where it costs too much.
+
+        None too where the robot cannot take the heading of its goal there.
+        """
+        ended = self.ended(*self._along(arcs, 3))
+        if ended is None:
+            return None
+        path, used = ended
         cost = self.sweep(path, used, limit)
         if cost is None:
             return None
@@ -212,9 +246,12 @@ class PathImprover:
 
     def drives(self, arcs: FloatArray) -> bool:
         """Keep the path along some arcs where it touches no wall, jams nothing and arrives."""
-        path, used = self._along(arcs)
-        x, y = path.poses[used - 1, :2].tolist()
-        if self.first_blocked(path, used) < used or self.goal.distance(x, y) > 0.0:
+        ended = self.ended(*self._along(arcs))
+        if ended is None:
+            return False
+        path, used = ended
+        goal = self.pose_goal or self.goal
+        if self.first_blocked(path, used) < used or not goal.reached_by(path.poses[used - 1]):
             return False
         cost = self.sweep(path, used, self.jam_cost)
         if cost is None:
@@ -229,6 +266,33 @@ class PathImprover:
         """The first of ``count`` poses where the robot touches a wall, none of those known does."""
         checker = core.CollisionChecker(self.room.footprint, self.room.walls)
         return known + checker.first_blocked(path.poses[known:count])
+
+    def ended(self, path: SweptPath, count: int) -> tuple[SweptPath, int] | None:
+        """A path of ``count`` poses whose end has the heading of the goal, if that asks for one.
+
+        Returns:
+            The path, not swept where its end is another one, and the number of its poses; None
+            where there is no such end.
+        """
+        if self.pose_goal is None:
+            return path, count
+        end = path_end(
+            self.world.robot,
+            self.pose_goal,
+            path.poses[:count],
+            self.turning_radius,
+            self.room.spacing,
+            core.CollisionChecker(self.room.footprint, self.room.walls),
+            self._straight,
+        )
+        if end is None:
+            return None
+        used = end.kept + len(end.poses)
+        other = make_swept_path(3 * used + 200, len(self.world.movables))
+        other.poses[:used] = np.concatenate([path.poses[: end.kept], end.poses])
+        other.curvatures[:used] = np.concatenate([path.curvatures[: end.kept], end.curvatures])
+        other.objects[0] = path.objects[0]
+        return other, used
 
     def laid_out(
         self, arcs: FloatArray, start: FloatArray | None = None, *, spare: int = 1

@@ -20,7 +20,7 @@ from pushplan.motion.random_tree.targets import Targets
 from pushplan.motion.room_ahead import gets_away, is_boxed_in
 from pushplan.motion.speed_profile import TIGHTEST
 from pushplan.motion.start_turn import drive_to_turn, start_turn
-from pushplan.world import Drive
+from pushplan.world import Drive, GoalDisc
 from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import path_length
 
@@ -148,9 +148,10 @@ class TreePaths:
         spread = _COARSE_PATH_SPREAD * size
         bounds = world.static.bounds
         targets = Targets(coarse, self._fraction, spread, bounds, improver.rng)
-        growth = TreeGrowth(
-            improver.lead.pose, improver.goal, targets, limits, bounds, shape, among
-        )
+        goal = improver.goal
+        if isinstance(goal, GoalDisc) and improver.pose_goal is not None:
+            goal = GoalDisc(goal.center, size)  # the end of its path is made anew
+        growth = TreeGrowth(improver.lead.pose, goal, targets, limits, bounds, shape, among)
         arcs = growth.grow(int(improver.rng.integers(1, 2**31)), done, improver.stopped)
         if arcs is None:
             return None

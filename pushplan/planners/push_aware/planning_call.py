@@ -83,7 +83,7 @@ class PushAwareSearch:
         """Search until the stop rule fires; None where there is no plan by then."""
         improver = self.improver
         status = self._first_plan()
-        self.bound = length_bound(self.world, improver.stopped)
+        self.bound = length_bound(improver.given, improver.stopped)
         if status is not None:
             return status
         table = self._table()
