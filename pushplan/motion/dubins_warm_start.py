@@ -48,8 +48,7 @@ def along_guide(improver: PathImprover, *, around: bool = False) -> bool:
 
 def is_way(improver: PathImprover, vias: FloatArray) -> bool:
     """Return True if curves through vias (V, 3) are a path without a jam; the improver keeps it."""
-    arcs = curves_through(vias, improver.lead.pose, improver.turning_radius)
-    return improver.candidate(arcs, improver.jam_cost, free=False) is not None
+    return improver.drives(curves_through(vias, improver.lead.pose, improver.turning_radius))
 
 
 def guides(improver: PathImprover, *, around: bool = False) -> Iterator[FloatArray]:

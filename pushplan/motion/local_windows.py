@@ -12,14 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pushplan.core import motion as core
+from pushplan.geometry.obstacles import obstacles_of
 from pushplan.motion.dubins_warm_start import along_guide, curves_through, guides, is_far, is_way
 from pushplan.motion.path_improver import PathImprover
 from pushplan.motion.random_tree.tree_paths import TreePaths
 from pushplan.motion.swept_path import SweptPath, make_swept_path
 from pushplan.world import GoalDisc, Movables, NavigationGoal, StaticMap, Stop, World
-from pushplan.world.checks import FloatArray
-from pushplan.world.outline import flatten, outline_boxes
+from pushplan.world.checks import BoolArray, FloatArray
 from pushplan.world.planning_call import PlanningCall
 from pushplan.world.polyline import arc_lengths
 
@@ -47,12 +46,13 @@ class _FirstPlanWithin(Stop):
 
 @dataclass(frozen=True)
 class _Way:
-    """Poses that are fixed so far, and curves along the rest of the guide."""
+    """A path that begins as it will stay, and goes on in curves along the rest of a guide."""
 
     path: SweptPath
-    count: int
-    fixed: int  # poses that are
-    bends: FloatArray  # (V,) length at which each of the last vias is reached [m]
+    count: int  # its poses
+    known: int  # poses up to which it stays, and the objects are known
+    vias: FloatArray  # (V, 3) poses along the rest of the guide
+    bends: FloatArray  # (V,) lengths at which they are reached [m]
 
 
 def warm_start(improver: PathImprover) -> None:
@@ -65,121 +65,101 @@ def warm_start(improver: PathImprover) -> None:
             return
 
 
-def _drive_in_windows(
-    improver: PathImprover,
-    vias: FloatArray,  # (V, 3) poses along the guide, the last in the goal
-) -> bool:
+def _drive_in_windows(improver: PathImprover, vias: FloatArray) -> bool:
     """Follow a guide, with searches in windows where that fails; True where it leads to a plan."""
-    head, fixed = improver.laid_out(improver.lead.pieces)
-    way = _continued(improver, head, fixed, vias)
+    head, count = improver.laid_out(improver.lead.pieces)
+    head.objects[0] = improver.world.movables.poses
+    way = _along_vias(improver, _Way(head, count, 1, vias, np.zeros(0)))
     reached = 0.0
     level = 0
     for _ in range(_WINDOWS):
-        fault = _first_fault(improver, way)
-        if fault is None:
-            return improver.swept(way.path, way.count, improver.jam_cost) is not None
+        fault, cost = _first_fault(improver, way)
+        if fault == way.count:
+            improver.keep(way.path, way.count, cost)
+            return True
         along = arc_lengths(way.path.poses[: way.count, :2])
         if along[fault] > reached + improver.size:
             level = 0
             reached = float(along[fault])
-        while level < len(_LEVELS):
-            if improver.stopped():
+        other = None
+        while other is None:
+            if level == len(_LEVELS) or improver.stopped():
                 return False
-            found = _window(improver, way, along, fault, _LEVELS[level])
+            other = _with_window(improver, way, along, fault, _LEVELS[level])
             level += 1
-            if found is None:
-                continue
-            (path, count), end = found
-            left = way.bends > along[end] + _STRAIGHT * improver.turning_radius
-            left[-1] = True
-            if end == way.count - 1:
-                left[:] = False
-            way = _continued(improver, path, count, vias[len(vias) - len(left) :][left])
-            vias = vias[len(vias) - len(left) :][left]
-            break
-        else:
-            return False
+        way = _along_vias(improver, other)
     return False
 
 
-def _continued(
-    improver: PathImprover,
-    head: SweptPath,
-    fixed: int,
-    vias: FloatArray,
-) -> _Way:
-    """The first poses of a path, and curves along vias behind them."""
-    arcs = curves_through(vias, head.poses[fixed - 1], improver.turning_radius)
-    tail, count = improver.laid_out(arcs, head.poses[fixed - 1])
-    path = _joined(improver, (head, 0, fixed), (tail, 1, count))
-    begun = arc_lengths(head.poses[:fixed, :2])[-1]
+def _along_vias(improver: PathImprover, way: _Way) -> _Way:
+    """A path that goes on through its vias."""
+    end = way.path.poses[way.count - 1]
+    arcs = curves_through(way.vias, end, improver.turning_radius)
+    tail, count = improver.laid_out(arcs, end)
+    path = _joined(way.path, way.count, tail, count)
+    begun = arc_lengths(way.path.poses[: way.count, :2])[-1]
     bends = begun + np.cumsum(np.abs(arcs[:, 0]))[2::3]
-    return _Way(path, fixed + count - 1, fixed, bends)
+    return _Way(path, way.count + count - 1, way.known, way.vias, bends)
 
 
-def _joined(improver: PathImprover, *pieces: tuple[SweptPath, int, int]) -> SweptPath:
-    """Poses first to last of some paths as one, with room for shortcuts."""
-    count = sum(last - first for _, first, last in pieces)
-    path = make_swept_path(3 * count + 200, len(improver.world.movables))
-    at = 0
-    for piece, first, last in pieces:
-        path.poses[at : at + last - first] = piece.poses[first:last]
-        path.curvatures[at : at + last - first] = piece.curvatures[first:last]
-        at += last - first
-    path.objects[0] = improver.world.movables.poses
-    return path
+def _joined(head: SweptPath, first: int, tail: SweptPath, last: int) -> SweptPath:
+    """The first poses of a path, and those of one that begins where they end."""
+    whole = make_swept_path(first + last - 1, head.objects.shape[1])
+    for part, before, after in zip(whole, head, tail, strict=True):
+        part[:first] = before[:first]
+        if part is not whole.objects:  # of the tail they are not known
+            part[first:] = after[1:last]
+    return whole
 
 
-def _first_fault(improver: PathImprover, way: _Way) -> int | None:
-    """The first pose at which the robot touches a wall or jams; objects are known up to there."""
+def _first_fault(improver: PathImprover, way: _Way) -> tuple[int, float]:
+    """The first pose at which the robot touches a wall or jams, and the cost up to there.
+
+    The objects are known before it. Where there is none it is the number of poses; then the cost is
+    that of the whole path [kg m].
+    """
     path = way.path
-    blocked = improver.first_blocked(path, way.count)
-    jam_length = improver.jam_cost / improver.world.robot.mass
-    core.sweep_cost(
-        path.view(), 0, blocked, improver.jam_cost, 2**62, improver.problem, improver.contacts
-    )
-    jams = np.flatnonzero(path.lengths[:blocked] >= jam_length)
-    if len(jams):
-        return int(jams[0])
-    return blocked if blocked < way.count else None
+    blocked = improver.first_blocked(path, way.count, way.known)
+    cost = improver.sweep(path, blocked, improver.jam_cost, way.known)
+    if cost is not None:
+        return blocked, cost
+    jams = path.lengths[:blocked] * improver.world.robot.mass >= improver.jam_cost
+    return int(np.argmax(jams)), np.inf
 
 
-def _window(
+def _with_window(
     improver: PathImprover, way: _Way, along: FloatArray, fault: int, reach: float
-) -> tuple[tuple[SweptPath, int], int] | None:
-    """The path with another way around a place, and the old pose at which that ends."""
-    size = improver.size
+) -> _Way | None:
+    """A path with another way around a fault, which ends where that does."""
     path = way.path
-    first = int(np.searchsorted(along, along[fault] - reach * size, side="right")) - 1
-    first = max(first, 0)
+    size = improver.size
+    first = max(int(np.searchsorted(along, along[fault] - reach * size, side="right")) - 1, 0)
     objects = improver.world.movables.moved_to(path.objects[first])
-    last = _end(improver, way, along, along[fault] + reach * size, objects)
-    goal: NavigationGoal = improver.goal
-    if last < way.count - 1:
-        goal = GoalDisc(path.poses[last, :2], _GOAL * size)
+    last = _end_of(improver, way, int(np.searchsorted(along, along[fault] + reach * size)), objects)
+    is_last = last == way.count - 1
+    goal = improver.goal if is_last else GoalDisc(path.poses[last, :2], _GOAL * size)
     places = path.poses[first : last + 1, :2]
-    if last < way.count - 1:
-        places = path.poses[first : last + 1, :2]
     wide = (_MARGIN + reach) * size
     box = np.concatenate([places.min(axis=0) - wide, places.max(axis=0) + wide])
-    world = _cropped(improver.world, path.poses[first], objects, goal, box)
-    found = _search(improver, world)
+    found = _search(improver, _cropped(improver.world, path.poses[first], objects, goal, box))
     if found is None:
         return None
-    joined = _joined(improver, (path, 0, first + 1), (found, 1, len(found.poses)))
-    return (joined, first + len(found.poses)), last
+    left = way.bends > along[last] + _STRAIGHT * improver.turning_radius
+    left[-1:] = True
+    if is_last:
+        left[:] = False
+    joined = _joined(path, first + 1, found, len(found.poses))
+    count = first + len(found.poses)
+    return _Way(joined, count, first + 1, way.vias[left], way.bends[left])
 
 
-def _end(
-    improver: PathImprover, way: _Way, along: FloatArray, least: float, objects: Movables
-) -> int:
-    """The first pose from a length [m] on at which there is room for the robot."""
-    size = improver.size
-    poses = way.path.poses[: way.count]
-    for n in range(int(np.searchsorted(along, least)), way.count - 1):
-        x, y = poses[n, :2].tolist()
-        away = np.hypot(*(objects.poses[:, :2] - (x, y)).T) - objects.radii
-        if (away > _ROOM * size).all() and improver.room.walls.can_turn(x, y, _ROOM * size):
+def _end_of(improver: PathImprover, way: _Way, first: int, objects: Movables) -> int:
+    """The first pose from some pose on at which there is room for the robot."""
+    room = _ROOM * improver.size
+    for n in range(first, way.count - 1):
+        x, y = way.path.poses[n, :2].tolist()
+        away = np.hypot(objects.poses[:, 0] - x, objects.poses[:, 1] - y) - objects.radii
+        if (away > room).all() and improver.room.walls.can_turn(x, y, room):
             return n
     return way.count - 1
 
@@ -189,39 +169,38 @@ def _cropped(
 ) -> World:
     """What there is of a world in a box."""
     static = world.static
-    box = np.concatenate(
-        [np.maximum(box[:2], static.bounds[:2]), np.minimum(box[2:], static.bounds[2:])]
-    )
-    boxes = outline_boxes(*flatten(static.convex_parts))
-    near = ((boxes[:, 2:] >= box[:2]) & (boxes[:, :2] <= box[2:])).all(axis=1)
+    low = np.maximum(box[:2], static.bounds[:2])
+    high = np.minimum(box[2:], static.bounds[2:])
+    near = _meets(obstacles_of(static).boxes, low, high)
     count = len(static.polygons)
-    polygons = tuple(static.polygons[k] for k in np.flatnonzero(near[:count]))
-    lines = near[count:]
-    cropped = StaticMap(polygons, static.segments[lines], static.radii[lines], box)
-    radii = objects.radii
-    reached = (
-        (objects.poses[:, :2] + radii[:, None] >= box[:2])
-        & (objects.poses[:, :2] - radii[:, None] <= box[2:])
-    ).all(axis=1)
-    return replace(
-        world, robot_pose=pose, static=cropped, movables=objects.select(reached), goal=goal
+    cropped = StaticMap(
+        tuple(static.polygons[k] for k in np.flatnonzero(near[:count])),
+        static.segments[near[count:]],
+        static.radii[near[count:]],
+        np.concatenate([low, high]),
     )
+    places = objects.poses[:, :2]
+    reach = objects.radii[:, None]
+    reached = _meets(np.hstack([places - reach, places + reach]), low, high)
+    movables = objects.select(reached)
+    return replace(world, robot_pose=pose, static=cropped, movables=movables, goal=goal)
+
+
+def _meets(boxes: FloatArray, low: FloatArray, high: FloatArray) -> BoolArray:
+    """(N,) True for the boxes (N, 4) that reach into the box from ``low`` to ``high``."""
+    return np.all((boxes[:, 2:] >= low) & (boxes[:, :2] <= high), axis=1)
 
 
 def _search(outer: PathImprover, world: World) -> SweptPath | None:
     """The first path in a window."""
-    stop = _FirstPlanWithin(outer.stopped, _ITERATIONS)
-    call = PlanningCall(world, stop, outer.rng)
+    call = PlanningCall(world, _FirstPlanWithin(outer.stopped, _ITERATIONS), outer.rng)
     improver = PathImprover(call, outer.config, outer.interaction, outer.turning_radius)
     trees = TreePaths(improver)
     if improver.begin() is None:
         trees.look_ahead()
         solved = along_guide(improver, around=True) or along_guide(improver)
-        while not solved and not improver.stopped():
-            for _ in trees.grow_two(outer.config.push_weight):
-                break
-            if improver.solved or trees.sealed or trees.boxed_in:
-                break
+        while not solved and not improver.stopped() and not (trees.sealed or trees.boxed_in):
+            solved = next(trees.grow_two(outer.config.push_weight), None) is not None
             trees.change_start()
             trees.relax()
     outer.iterations += improver.iterations

@@ -113,7 +113,7 @@ class PathImprover:
             here = make_swept_path(1, len(self.world.movables))
             here.poses[0] = self.world.robot_pose
             here.objects[0] = self.world.movables.poses
-            self._keep(here, 1, 0.0)
+            self.keep(here, 1, 0.0)
             return PlanStatus.SOLVED
         return None
 
@@ -199,56 +199,84 @@ class PathImprover:
         self,
         arcs: FloatArray,  # (E, 2) length [m] and curvature [1/m], from the end of the lead on
         limit: float = np.inf,  # cost that it must stay below [kg m]
-        *,
-        free: bool = True,  # True if it is known to touch no wall and to reach the goal
     ) -> Candidate | None:
-        """The path along some arcs with its cost; None if it is not one that could be a plan."""
-        path, used = self.laid_out(np.concatenate([self.lead.pieces, arcs]))
-        if not free:
-            x, y = path.poses[used - 1, :2]
-            if self.first_blocked(path, used) < used or self.goal.distance(x, y) > 0.0:
-                return None
-        return self.swept(path, used, limit)
-
-    def swept(self, path: SweptPath, count: int, limit: float) -> Candidate | None:
-        """The first ``count`` poses of a path with their cost; None where it passes the limit."""
-        cost = self._cost_of(path, count, limit)
+        """The path along some arcs, free of walls, with its cost; None where it costs too much."""
+        path, used = self._along(arcs, 3)
+        cost = self.sweep(path, used, limit)
         if cost is None:
             return None
-        self._keep(path, count, cost)
+        self.keep(path, used, cost)
         trial = make_swept_path(len(path.poses), len(self.world.movables))
-        return Candidate(path, trial.view(), count, cost)
+        return Candidate(path, trial.view(), used, cost)
 
-    def first_blocked(self, path: SweptPath, count: int) -> int:
-        """The first of ``count`` poses at which the robot touches a wall; ``count`` if none."""
+    def drives(self, arcs: FloatArray) -> bool:
+        """Keep the path along some arcs where it touches no wall, jams nothing and arrives."""
+        path, used = self._along(arcs)
+        x, y = path.poses[used - 1, :2].tolist()
+        if self.first_blocked(path, used) < used or self.goal.distance(x, y) > 0.0:
+            return False
+        cost = self.sweep(path, used, self.jam_cost)
+        if cost is None:
+            return False
+        self.keep(path, used, cost)
+        return True
+
+    def _along(self, arcs: FloatArray, spare: int = 1) -> tuple[SweptPath, int]:
+        return self.laid_out(np.concatenate([self.lead.pieces, arcs]), spare=spare)
+
+    def first_blocked(self, path: SweptPath, count: int, known: int = 0) -> int:
+        """The first of ``count`` poses where the robot touches a wall, none of those known does."""
         checker = core.CollisionChecker(self.room.footprint, self.room.walls)
-        return checker.first_blocked(path.poses[:count])
+        return known + checker.first_blocked(path.poses[known:count])
 
     def laid_out(
-        self, arcs: FloatArray, start: FloatArray | None = None
+        self, arcs: FloatArray, start: FloatArray | None = None, *, spare: int = 1
     ) -> tuple[SweptPath, int]:
-        """Poses along arcs (E, 2) from the robot or a pose to the goal, not swept; their number."""
+        """Lay poses along arcs (E, 2) from the robot, or from a pose, to the goal.
+
+        Args:
+            arcs: lengths [m] and curvatures [1/m].
+            start: (3,) where they begin; at the robot if None.
+            spare: times as many poses as there is room for.
+
+        Returns:
+            A path that is not swept, and the number of its poses.
+        """
         steps = [abs(arc) / core.step_along(turn, self.room.spacing) for arc, turn in arcs.tolist()]
-        capacity = 3 * int(sum(steps) + len(arcs)) + 200
+        capacity = spare * int(sum(steps) + len(arcs)) + 200
         path = make_swept_path(capacity, len(self.world.movables))
         begin = self.world.robot_pose if start is None else start
         used = core.lay_out(begin, arcs, path.view(), self.problem)
-        assert used > 0  # there is room for three times as many poses
+        assert used > 0  # there is room for all
         path.objects[0] = self.world.movables.poses
         return path, used
 
-    def _cost_of(self, path: SweptPath, count: int, limit: float) -> float | None:
-        """Sweep the objects along a path; its cost [kg m], None where it passes the limit.
+    def sweep(
+        self, path: SweptPath, count: int, limit: float = np.inf, known: int = 1
+    ) -> float | None:
+        """Sweep the objects along a path.
 
-        Sweeping through a crowd takes its time: None too where the stop rule fires meanwhile.
+        Sweeping through a crowd takes its time: there is no cost where the stop rule fires
+        meanwhile.
+
+        Args:
+            path: of which ``count`` poses are in use.
+            count: likewise.
+            limit: cost that it must stay below [kg m].
+            known: poses up to which the objects are known.
+
+        Returns:
+            Its cost [kg m]; None where it passes the limit.
         """
         cost = 0.0
-        swept = 1
+        swept = known
         view = path.view()
         problem = self.problem
-        for first, last in self._sweep_pace.pieces(count - 1, self.stopped):
-            swept = last + 1
-            cost = core.sweep_cost(view, first, swept, limit, ENDLESS, problem, self.contacts)
+        for first, last in self._sweep_pace.pieces(count - known, self.stopped):
+            swept = known + last
+            cost = core.sweep_cost(
+                view, known + first - 1, swept, limit, ENDLESS, problem, self.contacts
+            )
             if not cost < limit:
                 return None
         return cost if swept == count else None
@@ -275,10 +303,11 @@ class PathImprover:
                     problem,
                     self.contacts,
                 )
-                self._keep(candidate.path, candidate.count, candidate.cost)
+                self.keep(candidate.path, candidate.count, candidate.cost)
             self.iterations += self._batch
 
-    def _keep(self, path: SweptPath, count: int, cost: float) -> None:
+    def keep(self, path: SweptPath, count: int, cost: float) -> None:
+        """Keep a copy of the first ``count`` poses of a swept path if it is the best so far."""
         if cost >= self.best_cost:
             return
         if np.isnan(self.first_solution_s) and cost < self.jam_cost:
