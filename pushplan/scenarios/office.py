@@ -17,6 +17,7 @@ MOST_POLYGONS = 20_000
 _POLYGONS_PER_ROOM = 18.4  # in the mean
 _ROOM = (5.0, 4.5)  # length along the corridor and depth [m]
 _CORRIDOR = 2.0  # width [m]
+_PITCH = 2.0 * _ROOM[1] + _CORRIDOR  # from one corridor to the next [m]
 _WALL = 0.1  # thickness [m]
 _DOOR = 0.9  # width of the opening [m]
 _TO_NEIGHBOUR = 0.3  # fraction of the neighbouring rooms that have a door between them
@@ -61,10 +62,9 @@ def generate_office(
         InvalidInputError: if a value is out of range.
         ScenarioError: if the robot is too large for the office.
     """
-    rooms = integer("office polygons", polygons, low=100, high=MOST_POLYGONS) / _POLYGONS_PER_ROOM
+    integer("office polygons", polygons, low=100, high=MOST_POLYGONS)
     fraction = number("office boxes", boxes, low=0.0, high=1.0)
-    corridors = max(1, round(math.sqrt(rooms * _ROOM[0] / (2.0 * _pitch()))))
-    columns = math.ceil(rooms / (2.0 * corridors))
+    corridors, columns = _layout(polygons)
     outlines, doors = _walls(rng, corridors, columns)
     for k in range(2 * corridors * columns):
         outlines += _furniture(rng, _room(k, columns), doors)
@@ -84,15 +84,23 @@ def generate_office(
     )
 
 
-def _pitch() -> float:
-    """Distance from one corridor to the next [m]."""
-    return 2.0 * _ROOM[1] + _CORRIDOR
+def office_diagonal(polygons: int) -> float:
+    """Diagonal of an office of about so many static polygons [m]."""
+    corridors, columns = _layout(polygons)
+    return math.hypot(columns * _ROOM[0] + _CORRIDOR + _WALL, corridors * _PITCH + _WALL)
+
+
+def _layout(polygons: int) -> tuple[int, int]:
+    """Number of corridors, and of rooms on each side of one, for an office as wide as long."""
+    rooms = polygons / _POLYGONS_PER_ROOM
+    corridors = max(1, round(math.sqrt(rooms * _ROOM[0] / (2.0 * _PITCH))))
+    return corridors, math.ceil(rooms / (2.0 * corridors))
 
 
 def _room(k: int, columns: int) -> FloatArray:
     """Corners of a room (2, 2): at the left end of its corridor's wall and opposite of it [m]."""
     row, column = divmod(k, columns)
-    low = row // 2 * _pitch() + _ROOM[1]
+    low = row // 2 * _PITCH + _ROOM[1]
     left = column * _ROOM[0]
     if row % 2 == 0:  # below the corridor
         return np.array([(left, low), (left + _ROOM[0], low - _ROOM[1])])
@@ -105,11 +113,11 @@ def _walls(
     """Outlines of the walls, and the doors as poses x, y [m], theta along the wall [rad]."""
     length = columns * _ROOM[0]
     right = length + _CORRIDOR
-    top = corridors * _pitch()
+    top = corridors * _PITCH
     walls = _wall((0.0, 0.0), (0.0, top)) + _wall((right, 0.0), (right, top))
     for row in range(corridors + 1):  # the outer walls, and those between two rows of rooms
         end = right if row in (0, corridors) else length
-        walls += _wall((0.0, row * _pitch()), (end, row * _pitch()))
+        walls += _wall((0.0, row * _PITCH), (end, row * _PITCH))
     doors = []
     for row in range(2 * corridors):
         fronts = [_room(row * columns + column, columns) for column in range(columns)]
