@@ -188,7 +188,8 @@ def _cropped(
 
 def _meets(boxes: FloatArray, low: FloatArray, high: FloatArray) -> BoolArray:
     """(N,) True for the boxes (N, 4) that reach into the box from ``low`` to ``high``."""
-    return np.all((boxes[:, 2:] >= low) & (boxes[:, :2] <= high), axis=1)
+    meets: BoolArray = np.all((boxes[:, 2:] >= low) & (boxes[:, :2] <= high), axis=1)
+    return meets
 
 
 def _search(outer: PathImprover, world: World) -> SweptPath | None:
