@@ -35,7 +35,7 @@ _BOX_DENSITY = 5.0  # of a box of cardboard and its contents [kg/m²]
 _GAP = 0.02  # least distance between bodies at the start [m]
 _GOAL_RADIUS = 0.25  # as Nav2's goal checker has it [m]
 _TRIES = 30
-_PLACES = 300  # drawn for start and goal; more than half of them are free
+_PLACES = 300  # drawn for start and goal; a quarter of them or more are free
 
 
 def generate_office(
@@ -72,16 +72,44 @@ def generate_office(
     objects = _boxes_in_doors(rng, doors, fraction)
     objects += _boxes_elsewhere(rng, walls, objects, round(fraction * 2 * corridors * columns))
     yaw = np.array([0.0, 0.0, rng.uniform(-np.pi, np.pi)])
-    ends = _start_and_goal(rng, walls, objects, robot)
-    return World(
-        robot=robot,
-        robot_pose=np.array([*transform(yaw, ends[:1])[0], rng.uniform(-np.pi, np.pi)]),
-        static=StaticMap.build([transform(yaw, outline) for outline in outlines]),
-        movables=Movables.from_polygons(
-            [transform(yaw, outline) for outline in objects], density=_BOX_DENSITY
-        ),
-        goal=GoalDisc(transform(yaw, ends[1:])[0], _GOAL_RADIUS),
+    static = StaticMap.build([transform(yaw, outline) for outline in outlines])
+    movables = Movables.from_polygons(
+        [transform(yaw, outline) for outline in objects], density=_BOX_DENSITY
     )
+    start, end = start_and_goal(rng, static, movables, robot)
+    return World(robot, start, static, movables, GoalDisc(end, _GOAL_RADIUS))
+
+
+def start_and_goal(
+    rng: np.random.Generator, static: StaticMap, movables: Movables, robot: RobotModel
+) -> tuple[FloatArray, FloatArray]:
+    """A pose x, y, theta and a point [m], half a map apart, for a disc around the robot.
+
+    Both are off everything, in the largest connected piece of the floor among what is static.
+
+    Raises:
+        ScenarioError: if there is no such pair.
+    """
+    # a buffer's corners lie on the circle: 1 / cos lays its sides outside of it
+    reach = (robot.circumscribed_radius + _GAP) / math.cos(np.pi / 16.0)
+    walls = shapely.buffer(shapely.polygons(list(static.convex_parts)), reach, quad_segs=4)
+    boxes = [part for k in range(len(movables)) for part in movables.parts_world(k)]
+    taken = shapely.buffer(shapely.polygons(boxes), reach, quad_segs=4)
+    floor = shapely.difference(shapely.box(*static.bounds), shapely.union_all(walls))
+    pieces = shapely.get_parts(floor)
+    largest = pieces[np.argmax(shapely.area(pieces))]
+    low = static.bounds[:2]
+    high = static.bounds[2:]
+    places = rng.uniform(low, high, (_PLACES, 2))
+    places = places[
+        shapely.contains_xy(shapely.difference(largest, shapely.union_all(taken)), places)
+    ]
+    distances = np.hypot(*(places[:, None] - places).transpose(2, 0, 1))
+    pairs = np.argwhere(distances >= 0.5 * (high - low).max())
+    if not len(pairs):
+        raise ScenarioError(f"office: no way for robot {robot.name!r}; try a smaller one")
+    start, end = places[rng.choice(pairs)]
+    return np.array([*start, rng.uniform(-np.pi, np.pi)]), end
 
 
 def office_diagonal(polygons: int) -> float:
@@ -234,27 +262,3 @@ def _boxes_elsewhere(
         ):
             boxes.append(outline)
     return boxes
-
-
-def _start_and_goal(
-    rng: np.random.Generator,
-    walls: shapely.STRtree,
-    boxes: list[FloatArray],
-    robot: RobotModel,
-) -> FloatArray:
-    """Start and goal (2, 2) [m] for a disc around the robot, joined by a way, off all boxes."""
-    bounds = shapely.total_bounds(walls.geometries)
-    # what Shapely makes of a circle has its corners on it: 1 / cos lays the sides on it instead
-    reach = (robot.circumscribed_radius + _GAP) / math.cos(np.pi / 16.0)
-    grown = shapely.union_all(shapely.buffer(walls.geometries, reach, quad_segs=4))
-    floor = shapely.get_parts(shapely.difference(shapely.box(*bounds), grown))
-    largest = floor[np.argmax(shapely.area(floor))]
-    taken = shapely.union_all(shapely.buffer(shapely.polygons(boxes), reach, quad_segs=4))
-    places = rng.uniform(bounds[:2], bounds[2:], (_PLACES, 2))
-    places = places[shapely.contains_xy(shapely.difference(largest, taken), places)]
-    distances = np.hypot(*(places[:, None] - places).transpose(2, 0, 1))
-    pairs = np.argwhere(distances >= 0.5 * (bounds[2:] - bounds[:2]).max())
-    if not len(pairs):
-        raise ScenarioError(f"office: no way for {robot.name!r}; try a smaller robot")
-    ends: FloatArray = places[rng.choice(pairs)]
-    return ends
