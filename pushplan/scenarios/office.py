@@ -93,8 +93,11 @@ def start_and_goal(
     # a buffer's corners lie on the circle: 1 / cos lays its sides outside of it
     reach = (robot.circumscribed_radius + _GAP) / math.cos(np.pi / 16.0)
     walls = shapely.buffer(shapely.polygons(list(static.convex_parts)), reach, quad_segs=4)
-    boxes = [part for k in range(len(movables)) for part in movables.parts_world(k)]
-    taken = shapely.buffer(shapely.polygons(boxes), reach, quad_segs=4)
+    taken = [
+        shapely.Polygon(part).buffer(reach, quad_segs=4)
+        for k in range(len(movables))
+        for part in movables.parts_world(k)
+    ]
     floor = shapely.difference(shapely.box(*static.bounds), shapely.union_all(walls))
     pieces = shapely.get_parts(floor)
     largest = pieces[np.argmax(shapely.area(pieces))]
@@ -250,15 +253,15 @@ def _boxes_elsewhere(
 ) -> list[FloatArray]:
     """Outlines of boxes anywhere on the floor, off everything; fewer where there is no space."""
     bounds = shapely.total_bounds(walls.geometries)
+    placed = [shapely.Polygon(outline) for outline in others]
     boxes: list[FloatArray] = []
     for _ in range(_TRIES * count):
         if len(boxes) == count:
             break
         outline = _box(rng, rng.uniform((*bounds[:2], 0.0), (*bounds[2:], np.pi)))
         shape = shapely.Polygon(outline)
-        placed = shapely.polygons([*others, *boxes])
-        if not walls.query(shape, "dwithin", _GAP).size and (
-            not placed.size or shapely.distance(placed, shape).min() > _GAP
-        ):
+        is_off = all(shape.distance(other) > _GAP for other in placed)
+        if is_off and not walls.query(shape, "dwithin", _GAP).size:
             boxes.append(outline)
+            placed.append(shape)
     return boxes
