@@ -29,10 +29,10 @@ import numpy as np
 import shapely
 from scipy import ndimage
 
+from benchmarks.first_plan import timed_plan
 from benchmarks.reporting import command_line, head, origin, percentiles, row, write
 from pushplan.drawing import draw_world, save_image
 from pushplan.errors import PushplanError
-from pushplan.planners import make_planner
 from pushplan.world import (
     Deadline,
     Drive,
@@ -137,10 +137,7 @@ def fault_of(case: Case, plan: Plan, drivable: bool) -> str:
 
 def call(case: Case, planner: str, patience: float, pictures: Path | None) -> Call:
     """Plan until the first plan, and check it; name and draw the case if it fails."""
-    maker = make_planner(planner)
-    began = time.thread_time()
-    result = maker.plan(case.world, stop=FirstSolution() | Deadline(patience))
-    spent = time.thread_time() - began
+    spent, result = timed_plan(planner, case.world, FirstSolution() | Deadline(patience))
     plan = result.plan
     fault = "" if plan is None else fault_of(case, plan, result.status is PlanStatus.SOLVED)
     if plan is None or fault:
@@ -149,9 +146,8 @@ def call(case: Case, planner: str, patience: float, pictures: Path | None) -> Ca
             pictures.mkdir(parents=True, exist_ok=True)
             picture = draw_world(case.world, size_px=1000, plan=plan)
             save_image(pictures / f"{case.name}-{planner}.png", picture)
-    if plan is None:
-        return Call(case, result.status, math.inf, math.nan, fault)
-    return Call(case, result.status, spent, plan.length / case.reference_m, fault)
+    length = math.nan if plan is None else plan.length
+    return Call(case, result.status, spent, length / case.reference_m, fault)
 
 
 def barn_cases(folder: Path, robot: RobotModel, seed: int | None = None) -> Iterator[Case]:
