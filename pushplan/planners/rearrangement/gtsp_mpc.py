@@ -46,8 +46,9 @@ class GtspMpc(RearrangementPolicy):
 
     Args:
         config: settings.
-        stop: stop rule of each choice, counted in simulated pushes; what was found until then is
-            driven. By default ``max_rollouts`` of the config.
+        stop: stop rule of each decision, counted in simulated pushes. What a time limit interrupts
+            goes on in the next step, while the robot stands (``max_pause`` of the config). By
+            default ``max_rollouts`` of the config.
         costs: terms that are added to the cost by which pushes are chosen.
         overrides: fields of the default config to change, in place of ``config``.
 
