@@ -44,124 +44,127 @@ class _FirstPlanWithin(Stop):
         return lambda done, cost: cost < np.inf or done >= self.iterations or self.stopped()
 
 
-@dataclass(frozen=True)
-class _Way:
-    """A path that begins as it will stay, and goes on in curves along the rest of a guide."""
-
-    path: SweptPath
-    count: int  # its poses
-    known: int  # poses up to which it stays, and the objects are known
-    vias: FloatArray  # (V, 3) poses along the rest of the guide
-    bends: FloatArray  # (V,) lengths at which they are reached [m]
-
-
 def warm_start(improver: PathImprover) -> None:
     """Try to drive along the shortest homotopic path, objects or not; the improver keeps it.
 
-    Where the curves along it fail and the goal is far, windows are searched.
+    Where the curves along it fail and the goal is far, windows are searched. What is found of a way
+    to a far goal is shortcut at once, as trees are slow to find better ones.
     """
+    far = is_far(improver)
     for vias in guides(improver):
-        if is_way(improver, vias) or (is_far(improver) and _drive_in_windows(improver, vias)):
-            return
+        if is_way(improver, vias) or (far and _GuidedDrive(improver, vias).run()):
+            break
+    if far and improver.solved:
+        improver.work_out_best()
 
 
-def _drive_in_windows(improver: PathImprover, vias: FloatArray) -> bool:
-    """Follow a guide, with searches in windows where that fails; True where it leads to a plan."""
-    head, count = improver.laid_out(improver.lead.pieces)
-    head.objects[0] = improver.world.movables.poses
-    way = _along_vias(improver, _Way(head, count, 1, vias, np.zeros(0)))
-    reached = 0.0
-    level = 0
-    for _ in range(_WINDOWS):
-        fault, cost = _first_fault(improver, way)
-        if fault == way.count:
-            improver.keep(way.path, way.count, cost)
-            return True
-        along = arc_lengths(way.path.poses[: way.count, :2])
-        if along[fault] > reached + improver.size:
-            level = 0
-            reached = float(along[fault])
-        other = None
-        while other is None:
-            if level == len(_LEVELS) or improver.stopped():
+class _GuidedDrive:
+    """A path that begins as it will stay, and goes on in curves along the rest of a guide."""
+
+    def __init__(self, improver: PathImprover, vias: FloatArray) -> None:
+        self._improver = improver
+        self._vias = vias  # (V, 3) poses along the rest of the guide
+        self._bends = np.zeros(0)  # (V,) lengths at which they are reached [m]
+        self._path = make_swept_path(0, len(improver.world.movables))
+        self._count = 0
+        self._known = 1  # poses up to which the path stays, and the objects are known
+        self._append(*improver.laid_out(improver.lead.pieces))
+        self._path.objects[0] = improver.world.movables.poses
+
+    def run(self) -> bool:
+        """Search windows where the curves fail; True where that leads to a plan."""
+        improver = self._improver
+        self._follow_guide()
+        reached = 0.0
+        level = 0
+        for _ in range(_WINDOWS):
+            fault, cost = self._first_fault()
+            if improver.stopped():
                 return False
-            other = _with_window(improver, way, along, fault, _LEVELS[level])
-            level += 1
-        way = _along_vias(improver, other)
-    return False
+            if fault == self._count:
+                improver.keep(self._path, self._count, cost)
+                return True
+            along = arc_lengths(self._path.poses[: self._count, :2])
+            if along[fault] > reached + improver.size:
+                level = 0
+                reached = float(along[fault])
+            found = False
+            while not found:
+                if level == len(_LEVELS) or improver.stopped():
+                    return False
+                found = self._search_around(fault, along, _LEVELS[level])
+                level += 1
+            self._follow_guide()
+        return False
 
+    def _append(self, tail: SweptPath, count: int, first: int = 0) -> None:
+        """Add poses ``first`` to ``count`` of a path, of which objects are not known."""
+        whole = self._count + count - first
+        if whole > len(self._path.poses):
+            larger = make_swept_path(2 * whole, len(self._improver.world.movables))
+            for ours, before in zip(larger, self._path, strict=True):
+                ours[: self._count] = before[: self._count]
+            self._path = larger
+        self._path.poses[self._count : whole] = tail.poses[first:count]
+        self._path.curvatures[self._count : whole] = tail.curvatures[first:count]
+        self._count = whole
 
-def _along_vias(improver: PathImprover, way: _Way) -> _Way:
-    """A path that goes on through its vias."""
-    end = way.path.poses[way.count - 1]
-    arcs = curves_through(way.vias, end, improver.turning_radius)
-    tail, count = improver.laid_out(arcs, end)
-    path = _joined(way.path, way.count, tail, count)
-    begun = arc_lengths(way.path.poses[: way.count, :2])[-1]
-    bends = begun + np.cumsum(np.abs(arcs[:, 0]))[2::3]
-    return _Way(path, way.count + count - 1, way.known, way.vias, bends)
+    def _follow_guide(self) -> None:
+        """Go on through the vias."""
+        end = self._path.poses[self._count - 1]
+        begun = arc_lengths(self._path.poses[: self._count, :2])[-1]
+        arcs = curves_through(self._vias, end, self._improver.turning_radius)
+        self._append(*self._improver.laid_out(arcs, end), 1)
+        self._bends = begun + np.cumsum(np.abs(arcs[:, 0]))[2::3]
 
+    def _first_fault(self) -> tuple[int, float]:
+        """The first pose at which the robot touches a wall or jams, and the cost up to there.
 
-def _joined(head: SweptPath, first: int, tail: SweptPath, last: int) -> SweptPath:
-    """The first poses of a path, and those of one that begins where they end."""
-    whole = make_swept_path(first + last - 1, head.objects.shape[1])
-    for part, before, after in zip(whole, head, tail, strict=True):
-        part[:first] = before[:first]
-        if part is not whole.objects:  # of the tail they are not known
-            part[first:] = after[1:last]
-    return whole
+        The objects are known before it. Where there is none it is the number of poses; then the
+        cost is that of the whole path [kg m].
+        """
+        improver = self._improver
+        path = self._path
+        blocked = improver.first_blocked(path, self._count, self._known)
+        cost = improver.sweep(path, blocked, improver.jam_cost, self._known)
+        if cost is not None:
+            return blocked, cost
+        jams = path.lengths[:blocked] * improver.world.robot.mass >= improver.jam_cost
+        return int(np.argmax(jams)), np.inf
 
+    def _search_around(self, fault: int, along: FloatArray, reach: float) -> bool:
+        """Cut the path before a fault, and go on with another way to behind it if there is one."""
+        path = self._path
+        improver = self._improver
+        size = improver.size
+        before, behind = along[fault] + np.array([-reach, reach]) * size
+        first = max(int(np.searchsorted(along, before, side="right")) - 1, 0)
+        objects = improver.world.movables.moved_to(path.objects[first])
+        last = self._end_from(int(np.searchsorted(along, behind)), objects)
+        is_last = last == self._count - 1
+        goal = improver.goal if is_last else GoalDisc(path.poses[last, :2], _GOAL * size)
+        places = path.poses[first : last + 1, :2]
+        wide = (_MARGIN + reach) * size
+        box = np.concatenate([places.min(axis=0) - wide, places.max(axis=0) + wide])
+        found = _search(improver, _cropped(improver.world, path.poses[first], objects, goal, box))
+        if found is None:
+            return False
+        self._count = self._known = first + 1
+        self._append(found, len(found.poses), 1)
+        left = self._bends > along[last] + _STRAIGHT * improver.turning_radius
+        left[-1:] = True
+        self._vias = self._vias[left & (not is_last)]
+        return True
 
-def _first_fault(improver: PathImprover, way: _Way) -> tuple[int, float]:
-    """The first pose at which the robot touches a wall or jams, and the cost up to there.
-
-    The objects are known before it. Where there is none it is the number of poses; then the cost is
-    that of the whole path [kg m].
-    """
-    path = way.path
-    blocked = improver.first_blocked(path, way.count, way.known)
-    cost = improver.sweep(path, blocked, improver.jam_cost, way.known)
-    if cost is not None:
-        return blocked, cost
-    jams = path.lengths[:blocked] * improver.world.robot.mass >= improver.jam_cost
-    return int(np.argmax(jams)), np.inf
-
-
-def _with_window(
-    improver: PathImprover, way: _Way, along: FloatArray, fault: int, reach: float
-) -> _Way | None:
-    """A path with another way around a fault, which ends where that does."""
-    path = way.path
-    size = improver.size
-    first = max(int(np.searchsorted(along, along[fault] - reach * size, side="right")) - 1, 0)
-    objects = improver.world.movables.moved_to(path.objects[first])
-    last = _end_of(improver, way, int(np.searchsorted(along, along[fault] + reach * size)), objects)
-    is_last = last == way.count - 1
-    goal = improver.goal if is_last else GoalDisc(path.poses[last, :2], _GOAL * size)
-    places = path.poses[first : last + 1, :2]
-    wide = (_MARGIN + reach) * size
-    box = np.concatenate([places.min(axis=0) - wide, places.max(axis=0) + wide])
-    found = _search(improver, _cropped(improver.world, path.poses[first], objects, goal, box))
-    if found is None:
-        return None
-    left = way.bends > along[last] + _STRAIGHT * improver.turning_radius
-    left[-1:] = True
-    if is_last:
-        left[:] = False
-    joined = _joined(path, first + 1, found, len(found.poses))
-    count = first + len(found.poses)
-    return _Way(joined, count, first + 1, way.vias[left], way.bends[left])
-
-
-def _end_of(improver: PathImprover, way: _Way, first: int, objects: Movables) -> int:
-    """The first pose from some pose on at which there is room for the robot."""
-    room = _ROOM * improver.size
-    for n in range(first, way.count - 1):
-        x, y = way.path.poses[n, :2].tolist()
-        away = np.hypot(objects.poses[:, 0] - x, objects.poses[:, 1] - y) - objects.radii
-        if (away > room).all() and improver.room.walls.can_turn(x, y, room):
-            return n
-    return way.count - 1
+    def _end_from(self, first: int, objects: Movables) -> int:
+        """The first pose from some pose on at which there is room for the robot."""
+        room = _ROOM * self._improver.size
+        for n in range(first, self._count - 1):
+            x, y = self._path.poses[n, :2].tolist()
+            away = np.hypot(objects.poses[:, 0] - x, objects.poses[:, 1] - y) - objects.radii
+            if (away > room).all() and self._improver.room.walls.can_turn(x, y, room):
+                return n
+        return self._count - 1
 
 
 def _cropped(

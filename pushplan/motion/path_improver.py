@@ -17,6 +17,7 @@ from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_search_config import (
     BATCH,
     INSET,
+    LEAST_GAIN,
     SHORTCUTS,
     SPACING,
     PathSearchConfig,
@@ -281,6 +282,24 @@ class PathImprover:
                 return None
         return cost if swept == count else None
 
+    def work_out(self, candidate: Candidate) -> None:
+        """Shortcut a path for as long as that pays and the stop rule allows."""
+        while not self.stopped():
+            before = candidate.cost
+            self.shortcut(candidate)
+            if candidate.cost > (1.0 - LEAST_GAIN) * before:
+                return
+
+    def work_out_best(self) -> None:
+        """Shortcut the best path."""
+        if self.best is None:
+            return
+        count = len(self.best.poses)
+        path, trial = (make_swept_path(3 * count + 200, len(self.world.movables)) for _ in "ab")
+        for ours, best in zip(path, self.best, strict=True):
+            ours[:count] = best
+        self.work_out(Candidate(path, trial.view(), count, self.best_cost))
+
     def shortcut(self, candidate: Candidate) -> None:
         """Try `SHORTCUTS` shortcuts, as long as the stop rule allows."""
         view = candidate.path.view()
@@ -303,7 +322,7 @@ class PathImprover:
                     problem,
                     self.contacts,
                 )
-                self.keep(candidate.path, candidate.count, candidate.cost)
+            self.keep(candidate.path, candidate.count, candidate.cost)
             self.iterations += self._batch
 
     def keep(self, path: SweptPath, count: int, cost: float) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 
 import numpy as np
 
@@ -114,8 +115,7 @@ class TreePaths:
         among = room.walls
         shape = room.footprint
         if np.isinf(push_weight):
-            boxes = world.movables.every_part_world
-            among = obstacles(keep_out(world), boxes)
+            among = self._among
             if not core.CollisionChecker(shape, among).is_free(improver.lead.pose):
                 return None  # the robot touches an object already: only pushing helps
         coarse = coarse_path(world, push_weight, improver.stopped)
@@ -156,6 +156,12 @@ class TreePaths:
             return None
         improver.nodes += len(arcs)
         return improver.candidate(arcs)
+
+    @cached_property
+    def _among(self) -> core.ConvexObstacles:
+        """Walls and objects, where they are at first."""
+        world = self._improver.world
+        return obstacles(keep_out(world), world.movables.every_part_world)
 
     def _around_walls(self) -> FloatArray:
         """A path around the walls alone, where the coarse grid misses a narrow passage."""
