@@ -86,8 +86,8 @@ def run_up(world: World, goal: GoalPose, radius: float) -> float:
     """The shortest straight way into a goal pose from where the robot has room to turn [m].
 
     A differential drive has room where it can turn on the spot, another one where a disc is free
-    that is larger than the robot by its least turning radius. It is 0 where there is room at the goal, or no such way, and negative
-    for one that is driven back, by a robot that may.
+    that is larger than the robot by its least turning radius. It is 0 where there is room at the
+    goal, or no such way, and negative for one that is driven back, by a robot that may.
 
     Args:
         world: the scene.
