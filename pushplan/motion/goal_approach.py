@@ -87,8 +87,7 @@ def run_up(world: World, goal: GoalPose, radius: float) -> float:
 
     A differential drive has room where it can turn on the spot, another one where a disc is free
     that is larger than the robot by its least turning radius. It is 0 where there is room at the
-    goal, or no such way, and negative
-    for one that is driven back, by a robot that may.
+    goal, or no such way, and negative for one that is driven back, by a robot that may.
 
     Args:
         world: the scene.

@@ -76,8 +76,7 @@ class PathImprover:
         turning_radius: float,  # least one of plans at first [m]
     ) -> None:
         world = call.world
-        self.given = world
-        """The scene with its own goal."""
+        self.given = world  # with its own goal
         self.pose_goal = world.goal if isinstance(world.goal, GoalPose) else None
         """A goal with a heading; searches of `world` lead to where the end of a path begins."""
         self._straight = 0.0
@@ -113,8 +112,8 @@ class PathImprover:
         self._goal_of_paths = self.room.goal
         if self.pose_goal is not None:
             turns = turns_at_end(world.robot) and not self._straight
-            place = self.room.goal[1:4]
-            self._goal_of_paths = np.array([2.0 + turns, *place, self.pose_goal.heading])
+            self._goal_of_paths = np.append(self.room.goal[:4], self.pose_goal.heading)
+            self._goal_of_paths[0] = 2.0 + turns
         # crowded worlds are slow to sweep: look at the stop rule more often
         self._batch = max(1, 10 * BATCH // (10 + len(world.movables)))
         self._call = call
@@ -131,10 +130,8 @@ class PathImprover:
         if goal_is_outside(self.given):
             return PlanStatus.GOAL_UNREACHABLE
         goal = self.pose_goal
-        if goal is not None:
-            margin = start_margin(self.world, margin, goal.pose)
-            if margin is None:
-                return PlanStatus.GOAL_UNREACHABLE
+        if goal is not None and (margin := start_margin(self.world, margin, goal.pose)) is None:
+            return PlanStatus.GOAL_UNREACHABLE
         self._set_margin(margin)
         if self.given.goal_reached:
             here = make_swept_path(1, len(self.world.movables))

@@ -109,10 +109,7 @@ def polyline_result(
 
 
 def _ended_at(world: World, goal: GoalPose, plan: Plan, spacing: float) -> Plan | None:
-    """A plan with an end at the heading of the goal, driven at full speed; None if there is none.
-
-    A robot that can slow down does so in turns that are sharper than its turn rate.
-    """
+    """A plan with an end at the goal's heading, driven at full speed; None if there is none."""
     robot = world.robot
     checker = core.CollisionChecker(footprint(robot), obstacles(keep_out(world)))
     radius = turning_radius(robot, 1.0)

@@ -70,7 +70,7 @@ def suits_keyholes(world: World, config: KeyholeConfig) -> bool:
     static = world.static
     goal = world.goal
     if isinstance(goal, GoalPose):
-        x, y = goal.center.tolist()
+        x, y = goal.center
         if not obstacles(static).can_turn(x, y, _TURNS_IN * robot.circumscribed_radius):
             return False
     sides = (static.bounds[2:] - static.bounds[:2]) / (config.cell * robot.circumscribed_radius)
