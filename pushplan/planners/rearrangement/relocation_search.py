@@ -166,6 +166,8 @@ class RelocationSearch:
             if scene.budget.is_over:
                 self.interrupted = True
                 heapq.heappush(self._open, entry)  # some of it may have been left out
+        if self.interrupted and scene.budget.stopped:  # no time to choose among what is found
+            return []
         now = self._now
         found = [
             (self._failing[self._place(state)] * scene.size, state)
