@@ -156,7 +156,7 @@ def office_worlds(name: str, seed: int) -> Iterator[World]:
 
 @dataclass(frozen=True)
 class Measured:
-    """What a planner does in one case; times are infinite without a plan."""
+    """Times of a planner in one case, infinite without a plan."""
 
     new: FloatArray  # CPU time of first calls on a map [s]
     same: FloatArray  # of later calls
