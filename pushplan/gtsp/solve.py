@@ -89,8 +89,9 @@ def solve_gtsp(
         names, costs, clusters = graph_instance(costs)
     matrix = checked_costs(costs)
     members = checked_clusters(clusters, len(matrix))
-    starts = [fixed_start] if isinstance(fixed_start, int | np.integer) else fixed_start
-    start = checked_nodes("fixed_start", starts, names, len(matrix))
+    if isinstance(fixed_start, int | np.integer):
+        fixed_start = [fixed_start]
+    start = checked_nodes("fixed_start", fixed_start, names, len(matrix))
     check_tour("fixed_start", start, matrix, members)
     given: IntArray | None = None
     if initial is not None:
@@ -111,7 +112,9 @@ def solve_gtsp(
         cost = tour_cost(matrix, nodes)
         if cost == math.inf:  # all nodes are fixed
             return Tour((), math.inf, math.inf, TourStatus.INFEASIBLE, tour.stats)
-        bound = cost if tour.status is TourStatus.OPTIMAL else min(tour.lower_bound, cost)
+        bound = min(tour.lower_bound, cost)
+        if tour.status is TourStatus.OPTIMAL:
+            bound = cost
         tour = replace(tour, nodes=tuple(nodes.tolist()), cost=cost, lower_bound=bound)
     if given is not None and tour_cost(matrix, given) < tour.cost:
         tour = _given(tour, given, tour_cost(matrix, given))
@@ -144,13 +147,11 @@ def _contracted(
 
 def _given(tour: Tour, nodes: IntArray, cost: float) -> Tour:
     """The tour that was given, where the result of the call costs more or there is none."""
-    return Tour(
-        tuple(nodes.tolist()),
-        cost,
-        min(tour.lower_bound, cost),
-        TourStatus.OPTIMAL if tour.status is TourStatus.OPTIMAL else TourStatus.FEASIBLE,
-        replace(tour.stats, best_s=0.0),
-    )
+    status = tour.status
+    if status is not TourStatus.OPTIMAL:
+        status = TourStatus.FEASIBLE
+    bound = min(tour.lower_bound, cost)
+    return Tour(tuple(nodes.tolist()), cost, bound, status, replace(tour.stats, best_s=0.0))
 
 
 @dataclass

@@ -154,7 +154,9 @@ class _GuidedDrive:
         objects = improver.world.movables.moved_to(path.objects[first])
         last = self._end_from(int(np.searchsorted(along, behind)), objects)
         is_last = last == self._count - 1
-        goal = improver.goal if is_last else GoalDisc(path.poses[last, :2], _GOAL * size)
+        goal: NavigationGoal = GoalDisc(path.poses[last, :2], _GOAL * size)
+        if is_last:
+            goal = improver.goal
         places = path.poses[first : last + 1, :2]
         wide = (_MARGIN + reach) * size
         box = np.concatenate([places.min(axis=0) - wide, places.max(axis=0) + wide])

@@ -187,8 +187,9 @@ class GtspMpc(RearrangementPolicy):
         if not choosing.call.ready(scene.world.time):
             return False
         self._choosing = None
-        choice = choosing.call.result()
-        best = choice if choosing.ahead else self._best_so_far(scene, choosing.scene, choice)
+        best: PushChoice | None = choosing.call.result()
+        if best is not None and not choosing.ahead:
+            best = self._best_so_far(scene, choosing.scene, best)
         return best is not None and self._begin(scene, best)
 
     def _best_so_far(

@@ -145,7 +145,9 @@ def _by_tours(
         else:
             known[order[0]] = costs[-1, order[0]] = found[0]
         if stop is not None:
-            initial = [*order[1:], order[0]] if found is None or math.isinf(found[0]) else order
+            initial = order
+            if found is None or math.isinf(found[0]):
+                initial = [*order[1:], order[0]]
     rest = [n for n in known if math.isfinite(known[n])]
     rest.sort(key=lambda n: (known[n] / len(graph.pushes[n].serves), n))
     return rest[:1]

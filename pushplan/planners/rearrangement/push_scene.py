@@ -119,7 +119,9 @@ class PushScene:
     @property
     def finer_lattice_s(self) -> float:
         """Time that it takes to make that lattice and to search it, roughly [s]."""
-        return 0.0 if "finer" in self.progress else _POSE_S * 4.0 * self.fine.grid.blocked.size
+        if "finer" in self.progress:
+            return 0.0
+        return _POSE_S * 4.0 * self.fine.grid.blocked.size
 
     def on_finer_lattice(self) -> PushScene:
         """The same with approaches on half the cells, that keep little distance from walls."""

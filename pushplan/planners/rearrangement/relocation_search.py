@@ -219,7 +219,9 @@ class RelocationSearch:
             side = self._side(state)
             place = self._place(state)
             if self._sides[side] < most and place not in self._failing:
-                cache = self._interrupted_rollouts if scene.budget.has_rule else None
+                cache = None
+                if scene.budget.has_rule:
+                    cache = self._interrupted_rollouts
                 failing = failing_margins(scene, k, state.poses, self._horizon, cache)
                 if scene.budget.is_over:
                     return

@@ -110,7 +110,9 @@ class SearchBudget:
         return again
 
     def _is_late(self, part: int) -> bool:
-        fraction = _COLLECTING if self._collects else _ROUNDS[self._round][part]
+        fraction = _ROUNDS[self._round][part]
+        if self._collects:
+            fraction = _COLLECTING
         if self._elapsed >= fraction * self.seconds:
             self._late = self.interrupted = self.out_of_time = True
         return self._late
