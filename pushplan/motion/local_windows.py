@@ -184,7 +184,7 @@ class _GuidedDrive:
 def _cropped(
     world: World, pose: FloatArray, objects: Movables, goal: NavigationGoal, box: FloatArray
 ) -> World:
-    """What there is of a world in a box."""
+    """The part of a world that lies in a box."""
     static = world.static
     low = np.maximum(box[:2], static.bounds[:2])
     high = np.minimum(box[2:], static.bounds[2:])

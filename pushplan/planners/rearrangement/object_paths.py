@@ -214,7 +214,7 @@ class PushCostToGo:
 
 
 def _goal_shapes(goal: Goal, radius: float) -> Any:
-    """Where an object is done, as a prepared shape."""
+    """The area in which an object is done, as a prepared shape."""
     places = done_places(goal, radius, 1.0)
     if places is None:
         assert isinstance(goal, Receptacle)

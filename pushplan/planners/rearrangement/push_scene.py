@@ -106,11 +106,11 @@ class PushScene:
 
     @cached_property
     def progress(self) -> dict[Hashable, Any]:
-        """What decisions for this scene have worked out: an interrupted one is gone on with."""
+        """Results of decisions for this scene; one that was interrupted is gone on with."""
         return {}
 
     def known(self, key: Hashable, make: Callable[[], T]) -> T:
-        """What `make` gives, made once for the scene."""
+        """The result of `make`, made once for the scene."""
         if key not in self.progress:
             self.progress[key] = make()
         found: T = self.progress[key]

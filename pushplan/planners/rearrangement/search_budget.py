@@ -99,7 +99,7 @@ class SearchBudget:
 
     @property
     def left_s(self) -> float:
-        """What is left of a time limit [s]."""
+        """Rest of a time limit [s]."""
         return max(self.seconds - self._elapsed, 0.0)
 
     def next_round(self) -> bool:
@@ -158,7 +158,7 @@ class _TimeLimit(Stop):
 
     @property
     def seconds(self) -> float:
-        """What is left for the decision [s]."""
+        """Rest of the time for the decision [s]."""
         return self._budget.left_s
 
     def start(self) -> StopCheck:
