@@ -218,7 +218,7 @@ void bind_ways_out(nb::module_& module) {
         require_count("reach", reach.shape(0), shapes.count());
         require_count("weight", weight.shape(0), shapes.count());
         add_cell_weights(view(out), {{x, y}, cell}, shapes, rows_as<const CellBox>(within),
-                          {view(reach), view(weight)});
+                         {view(reach), view(weight)});
       },
       "out"_a.noconvert(), "x"_a, "y"_a, "cell"_a, "vertices"_a.noconvert(),
       "offsets"_a.noconvert(), "within"_a.noconvert(), "reach"_a.noconvert(),

@@ -26,6 +26,8 @@ from pushplan.world.checks import FloatArray, IntArray, array, expect, number
 
 _PLAIN_BUDGETS = 5  # of a search without estimates, enough where the way is about straight
 _CELLS = 10_000  # of estimates between two looks at a stop rule: about a millisecond
+_CELL = 0.6
+"""Side of a cell of estimates [clearances]; larger ones look through more closed passages."""
 _BUDGET = 20_000  # work of a search between two looks at a stop rule: about a millisecond
 
 
@@ -154,7 +156,7 @@ def _covered_sides(static: StaticMap, clearance: float) -> core.CoveredSides:
     contours = contours_of(static, clearance)
     bends = contours.corners, contours.incoming, contours.outgoing, contours.owner
     corners = core.Corners(*bends, *_boxes_of(static, clearance))
-    return core.CoveredSides(corners, static.bounds, clearance)
+    return core.CoveredSides(corners, static.bounds, _CELL * clearance)
 
 
 @lru_cache(maxsize=32)

@@ -11,8 +11,9 @@ namespace pushplan {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kMaxCells = 500'000.0;
+constexpr double kMaxCells = 1'000'000.0;
 constexpr double kMargin = 0.1;         // by which a side must be inside of an outline [cells]
+constexpr double kOverlap = 0.05;       // by which outlines overlap that close a passage [cells]
 constexpr double kLongest = 1.0198039;  // greatest ratio of a chamfer distance to the length
 constexpr double kSlack = 3.0;  // of a distance, from places in cells to their centres [cells]
 constexpr std::int32_t kUnreached = std::numeric_limits<std::int32_t>::max();
@@ -51,11 +52,9 @@ void narrow(std::span<const Vec2> outline, double first, std::span<Chord> chords
   }
 }
 
-/// Marks the sides along lines of constant `y` that an outline covers, with a margin around them.
-/// Lengths are cells; side i of a line goes from i to i + 1, and `sides` has `across` for each line
-/// and `along` between them. No path goes below 0 or beyond `extent` along a line.
-void cover(std::span<const Vec2> outline, Index lines, double extent, Index along, Index across,
-           std::vector<char>& sides) {
+/// Adds the part of each line of constant `y` that an outline covers, with a margin above and below
+/// it. Lengths are cells.
+void add_chords(std::span<const Vec2> outline, std::span<std::vector<Chord>> lines) {
   double low = kInfinity;
   double high = -kInfinity;
   for (const Vec2 corner : outline) {
@@ -63,25 +62,43 @@ void cover(std::span<const Vec2> outline, Index lines, double extent, Index alon
     high = std::max(high, corner.y);
   }
   const Index first = std::max(Index{0}, ceil_index(low + kMargin));
-  const Index last = std::min(lines - 1, floor_index(high - kMargin));
-  const Index count = floor_index(extent) + 1;
+  const Index last = std::min(static_cast<Index>(lines.size()) - 1, floor_index(high - kMargin));
   if (first > last) return;
   std::vector<Chord> chords(at(last - first + 1), Chord{-kInfinity, kInfinity});
   narrow(outline, static_cast<double>(first) - kMargin, chords);
   narrow(outline, static_cast<double>(first) + kMargin, chords);
   for (Index line = first; line <= last; ++line) {
     const Chord& chord = chords[at(line - first)];
-    if (!(chord.left <= chord.right)) continue;
-    const Index begin =
-        chord.left <= 0.0 ? 0 : std::max(Index{0}, ceil_index(chord.left + kMargin));
-    const Index end =
-        chord.right >= extent ? count : std::min(count, floor_index(chord.right - kMargin));
-    for (Index i = begin; i < end; ++i) sides[at(line * across + i * along)] = 1;
+    if (chord.left <= chord.right) lines[at(line)].push_back(chord);
+  }
+}
+
+/// Marks the sides along lines that chords cover together, where two of them overlap surely. Side i
+/// of a line goes from i to i + 1, and `sides` has `across` for each line and `along` between them.
+/// No path goes below 0 or beyond `extent` along a line.
+void cover(std::span<std::vector<Chord>> lines, double extent, Index along, Index across,
+           std::vector<char>& sides) {
+  const Index count = floor_index(extent) + 1;
+  for (std::size_t line = 0; line < lines.size(); ++line) {
+    std::vector<Chord>& chords = lines[line];
+    std::ranges::sort(chords, {}, &Chord::left);
+    for (std::size_t next = 0; next < chords.size();) {
+      Chord run = chords[next++];
+      while (next < chords.size() && chords[next].left <= run.right - kOverlap) {
+        run.right = std::max(run.right, chords[next++].right);
+      }
+      const Index begin = run.left <= 0.0 ? 0 : std::max(Index{0}, ceil_index(run.left + kMargin));
+      const Index end =
+          run.right >= extent ? count : std::min(count, floor_index(run.right - kMargin));
+      for (Index i = begin; i < end; ++i) {
+        sides[at(static_cast<Index>(line) * across + i * along)] = 1;
+      }
+    }
   }
 }
 
 constexpr std::array<Index, 8> kAlong{1, 1, 0, -1, -1, -1, 0, 1};  // columns of a move
-constexpr std::array<Index, 8> kUp{0, 1, 1, 1, 0, -1, -1, -1};      // rows of a move
+constexpr std::array<Index, 8> kUp{0, 1, 1, 1, 0, -1, -1, -1};     // rows of a move
 constexpr std::array<std::int32_t, 2> kCosts{5, 7};  // of moves straight and slanting [fifths]
 constexpr std::int32_t kKnight = 11;                 // of one of each, side by side
 constexpr std::size_t kBuckets = 2 * kKnight + 1;    // a move changes a length by less
@@ -98,17 +115,21 @@ CoveredSides::CoveredSides(Polygons outlines, const Box& box, double cell) {
   rows_ = floor_index(height / cell_) + 1;
   std::vector<char> left(at(rows_ * columns_), 0);   // whether that side of a cell is covered
   std::vector<char> below(at(rows_ * columns_), 0);  // and the one towards lower y
-  std::vector<Vec2> corners;                         // [cells]
+  std::vector<std::vector<Chord>> lines_of_x(at(columns_));
+  std::vector<std::vector<Chord>> lines_of_y(at(rows_));
+  std::vector<Vec2> corners;  // [cells]
   for (Index k = 0; k < outlines.count(); ++k) {
     if (outlines[k].empty()) continue;
     corners.clear();
     for (const Vec2 corner : outlines[k]) {
       corners.push_back({(corner.x - origin_.x) / cell_, (corner.y - origin_.y) / cell_});
     }
-    cover(corners, rows_, width / cell_, 1, columns_, below);
+    add_chords(corners, lines_of_y);
     for (Vec2& corner : corners) std::swap(corner.x, corner.y);
-    cover(corners, columns_, height / cell_, columns_, 1, left);
+    add_chords(corners, lines_of_x);
   }
+  cover(lines_of_y, width / cell_, 1, columns_, below);
+  cover(lines_of_x, height / cell_, columns_, 1, left);
   moves_.assign(at(rows_ * columns_), 0);
   const auto open = [&](int direction, Index from, Index to) {
     moves_[at(from)] |= static_cast<std::uint8_t>(1 << direction);

@@ -72,8 +72,8 @@ Index CollisionChecker::first_blocked(std::span<const Pose> poses) {
   const auto count = static_cast<Index>(poses.size());
   for (Index first = 0; first < count; first += kRun) {
     const Index end = std::min(first + kRun, count);
-    const auto run = poses.subspan(static_cast<std::size_t>(first),
-                                   static_cast<std::size_t>(end - first));
+    const auto run =
+        poses.subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(end - first));
     const auto [left, right] = std::ranges::minmax(run, {}, &Pose::x);
     const auto [low, high] = std::ranges::minmax(run, {}, &Pose::y);
     const Pose middle{0.5 * (left.x + right.x), 0.5 * (low.y + high.y), 0.0};

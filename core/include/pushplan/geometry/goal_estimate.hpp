@@ -60,9 +60,9 @@ class GoalEstimate {
   void spread(Index cell);                  // makes known what moves from it lead to
 
   const CoveredSides& cells_;
-  Index wanted_;                         // the start's cell
-  std::vector<std::int32_t> distances_;  // of the cells to the goal [fifths of a cell]
-  std::vector<Index> goals_;             // cells of the goal, the farthest from the start first
+  Index wanted_;                             // the start's cell
+  std::vector<std::int32_t> distances_;      // of the cells to the goal [fifths of a cell]
+  std::vector<Index> goals_;                 // cells of the goal, the farthest from the start first
   std::vector<std::vector<Index>> buckets_;  // cells by the length of a way through them
   std::int32_t now_ = 0;                     // the least such length
   std::int32_t empty_;                       // buckets in a row
