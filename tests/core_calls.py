@@ -225,8 +225,8 @@ VALID: dict[str, Any] = {
     "motion.fill_speed_profile.speeds": np.zeros(8),
     "motion.fill_speed_profile.turn_rates": np.zeros(8),
     "motion.turn_freely.out": np.zeros((2, 3)),
-    "motion.fill_cell_weights.out": np.zeros((4, 4)),
-    "motion.fill_cell_weights.within": [[0, 0, 2, 2], [0, 0, 2, 2]],
+    "motion.add_cell_weights.out": np.zeros((4, 4)),
+    "motion.add_cell_weights.within": [[0, 0, 2, 2], [0, 0, 2, 2]],
     "motion.recovery_path.steps": [[0.04, 0.0], [0.0, 0.08]],
     # observation
     "observation.to_pixels.out": np.zeros((2, 2)),

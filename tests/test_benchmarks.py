@@ -159,10 +159,10 @@ def test_real_maps_plans_in_worlds_and_maps_and_checks_the_plans(
 
 def test_real_maps_finds_a_plan_that_touches_an_obstacle(tmp_path: Path) -> None:
     from benchmarks.accuracy import real_maps
-    from pushplan.world import Plan
+    from pushplan.world import Plan, jackal
 
     barn_like(tmp_path, closed=True)
-    case = next(iter(real_maps.barn_cases(tmp_path)))
+    case = next(iter(real_maps.barn_cases(tmp_path, jackal())))
     end = np.array([-2.25, 12.5, np.pi / 2.0])
 
     def plan(*poses: object) -> Plan:

@@ -1,10 +1,13 @@
 """Plans on real maps: how many, how soon, and whether they touch anything.
 
-    python -m benchmarks.accuracy.real_maps [--barn FOLDER] [--nav2 FOLDER] [--pictures FOLDER]
+    python -m benchmarks.accuracy.real_maps [--barn FOLDER [--heading]] [--nav2 FOLDER]
+        [--pictures FOLDER]
 
 --barn holds worlds of the BARN challenge, worlds.npz: `cylinders` (N, 3) x, y, radius [m],
 `offsets` (W + 1,) rows of each world, `first` its number; and paths.npz, with reference paths
-`path_I` (P, 2) in cells of the generator. --nav2 holds maps of ROS's map server.
+`path_I` (P, 2) in cells of the generator. With --heading the goal is a pose, to 2 cm and 3°, in
+the middle of the goal's disc at a random heading, and two drives more plan that cannot turn on the
+spot. --nav2 holds maps of ROS's map server.
 
 Times are CPU time until the first plan [ms]. Shapely checks plans without pushplan's own collision
 tests: the footprint, moved along the plan, must not overlap a cylinder or a cell that is occupied
@@ -17,7 +20,7 @@ import math
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -26,17 +29,20 @@ import numpy as np
 import shapely
 from scipy import ndimage
 
+from benchmarks.first_plan import timed_plan
 from benchmarks.reporting import command_line, head, origin, percentiles, row, write
 from pushplan.drawing import draw_world, save_image
 from pushplan.errors import PushplanError
-from pushplan.planners import make_planner
 from pushplan.world import (
     Deadline,
+    Drive,
     FirstSolution,
     GoalDisc,
+    GoalPose,
     Movables,
     Plan,
     PlanStatus,
+    RobotModel,
     StaticMap,
     World,
     jackal,
@@ -53,9 +59,11 @@ PLANNERS = ("straight", "kinodynamic-rrt", "push-aware")
 
 BARN_START = np.array([-2.25, 3.0, math.pi / 2.0])
 BARN_GOAL = GoalDisc(np.array([-2.25, 13.0]), 1.0)
+BARN_TOLERANCE = 0.02, math.radians(3.0)  # of a goal pose
 BARN_BOUNDS = (-4.5, 0.0, 0.0, 14.5)
 BARN_CELL_M = 0.15
 BARN_FIRST_CELL = np.array([-4.425, 5.175])  # where all references keep the same clearance [m]
+BARN_TURNS = 0.5  # least turning radius of the drives that do not turn on the spot [m]
 OCCUPIED = 65  # least value of an occupied cell [%], as `load_nav2_map` has it
 NAV2_TOLERANCE_M = 0.25  # of a goal, Nav2's default
 NAV2_LEAST_WAY = 0.25  # from a start to its goal, as a fraction of the map's extent
@@ -110,7 +118,7 @@ def fault_of(case: Case, plan: Plan, drivable: bool) -> str:
     known = 3 if drivable else 2
     if not np.allclose(plan.poses[0, :known], world.robot_pose[:known], atol=1e-9):
         return "starts elsewhere"
-    if world.navigation_goal.distance(*plan.poses[-1, :2]) > 1e-9:
+    if not world.navigation_goal.reached_by(plan.poses[-1]):
         return "ends elsewhere"
     if not drivable:
         disc = (1.0 - TOUCH) * world.robot.inscribed_radius
@@ -129,10 +137,7 @@ def fault_of(case: Case, plan: Plan, drivable: bool) -> str:
 
 def call(case: Case, planner: str, patience: float, pictures: Path | None) -> Call:
     """Plan until the first plan, and check it; name and draw the case if it fails."""
-    maker = make_planner(planner)
-    began = time.thread_time()
-    result = maker.plan(case.world, stop=FirstSolution() | Deadline(patience))
-    spent = time.thread_time() - began
+    spent, result = timed_plan(planner, case.world, FirstSolution() | Deadline(patience))
     plan = result.plan
     fault = "" if plan is None else fault_of(case, plan, result.status is PlanStatus.SOLVED)
     if plan is None or fault:
@@ -141,13 +146,17 @@ def call(case: Case, planner: str, patience: float, pictures: Path | None) -> Ca
             pictures.mkdir(parents=True, exist_ok=True)
             picture = draw_world(case.world, size_px=1000, plan=plan)
             save_image(pictures / f"{case.name}-{planner}.png", picture)
-    if plan is None:
-        return Call(case, result.status, math.inf, math.nan, fault)
-    return Call(case, result.status, spent, plan.length / case.reference_m, fault)
+    length = math.nan if plan is None else plan.length
+    return Call(case, result.status, spent, length / case.reference_m, fault)
 
 
-def barn_cases(folder: Path) -> Iterator[Case]:
-    """The worlds of a folder; a reference is start, path and goal, up to the goal's tolerance."""
+def barn_cases(folder: Path, robot: RobotModel, seed: int | None = None) -> Iterator[Case]:
+    """The worlds of a folder, with goals at a random heading where a seed is given.
+
+    A reference is start, path and goal, up to the goal's tolerance.
+    """
+    goal: GoalDisc = BARN_GOAL
+    rng = np.random.default_rng(seed)
     with np.load(folder / "worlds.npz") as data, np.load(folder / "paths.npz") as paths:
         cylinders = data["cylinders"]
         for i, (low, high) in enumerate(pairwise(data["offsets"]), start=int(data["first"])):
@@ -156,10 +165,25 @@ def barn_cases(folder: Path) -> Iterator[Case]:
             static = StaticMap.build(segments=lines, radii=radii, bounds=BARN_BOUNDS)
             cells = BARN_FIRST_CELL + BARN_CELL_M * paths[f"path_{i}"]
             points = np.vstack([BARN_START[:2], cells, BARN_GOAL.center])
-            length = path_length(points) - BARN_GOAL.radius
+            if seed is not None:
+                place, turn = BARN_TOLERANCE
+                goal = GoalPose(goal.center, place, rng.uniform(-np.pi, np.pi), turn)
+            length = path_length(points) - goal.radius
             circles = shapely.buffer(shapely.points(x, y), radii, quad_segs=64)
-            world = World(jackal(), BARN_START, static, Movables.empty(), BARN_GOAL)
+            world = World(robot, BARN_START, static, Movables.empty(), goal)
             yield Case(f"barn-{i}", world, shapely.STRtree(circles), False, length)
+
+
+def drives() -> Iterator[RobotModel]:
+    """The Jackal, the same as a car, and at a constant speed."""
+    yield jackal()
+    car = jackal(drive=Drive.CAR, min_turning_radius=BARN_TURNS)
+    yield replace(car, name="jackal as a car")
+    rate = jackal().max_speed / BARN_TURNS
+    constant = jackal(
+        drive=Drive.CONSTANT_SPEED, max_turn_rate=rate, max_turn_acceleration=math.inf
+    )
+    yield replace(constant, name="jackal at constant speed")
 
 
 def largest_component(free: BoolArray, distance: float) -> IntArray:
@@ -226,6 +250,7 @@ def rows(name: str, cases: Callable[[], Iterable[Case]], planning: Callable[...,
 def main() -> None:
     parser = command_line(__doc__, seed=0)
     parser.add_argument("--barn", type=Path, metavar="FOLDER", help="of worlds.npz and paths.npz")
+    parser.add_argument("--heading", action="store_true", help="goals of BARN are poses")
     parser.add_argument("--nav2", type=Path, metavar="FOLDER", help="of .yaml files of maps")
     parser.add_argument("--patience", type=float, default=60.0, help="deadline [s]; default 60")
     parser.add_argument("--pairs", type=int, default=10, help="twice on each map; default 10")
@@ -234,8 +259,11 @@ def main() -> None:
     planning = partial(call, patience=options.patience, pictures=options.pictures)
     write(origin(), "")
     head("map", "planner", "solved", "path only", "wrong", *HEADS)
-    if options.barn:
-        rows("BARN", partial(barn_cases, options.barn), planning)
+    if options.barn and options.heading:
+        for robot in drives():
+            rows("BARN, poses", partial(barn_cases, options.barn, robot, options.seed), planning)
+    elif options.barn:
+        rows("BARN", partial(barn_cases, options.barn, jackal()), planning)
     for path in sorted(options.nav2.glob("*.yaml")) if options.nav2 else ():
         began = time.thread_time()
         try:

@@ -39,6 +39,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.first_plan import CpuDeadline
 from benchmarks.reporting import command_line
 from pushplan.control import MpcTracker, PathFollower
 from pushplan.envs import make
@@ -50,7 +51,6 @@ from pushplan.world import (
     MaxIterations,
     Movables,
     Planner,
-    Stop,
     StopCheck,
     World,
 )
@@ -121,23 +121,6 @@ class Watched(Deadline):
             return False
 
         return check
-
-
-@dataclass(frozen=True)
-class CpuDeadline(Stop):
-    """A deadline on the CPU time of the thread."""
-
-    budget_s: float
-
-    @property
-    def seconds(self) -> float:
-        """The budget [s]."""
-        return self.budget_s
-
-    def start(self) -> StopCheck:
-        """Arm the rule."""
-        end = time.thread_time() + self.budget_s
-        return lambda iterations, cost: time.thread_time() >= end
 
 
 class Collections:

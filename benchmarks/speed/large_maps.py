@@ -3,24 +3,33 @@
     python -m benchmarks.speed.large_maps [CALLS] [--planner NAME] [--case NAME]
     python -m benchmarks.speed.large_maps [CALLS] --figure docs/images/large-maps.png
 
-CPU time of a call that ends with its first plan. "new map" is the first call on a
-map that no planner has seen; "same map" are later calls from and to other places.
+CPU time of a call that ends with its first plan, or without one after a second of CPU time. "new
+map" is the first call on a map that no planner has seen; "same map" are later calls from and to
+other places. "after 1 s" is the cost of the plan after that second over that of the first, on new
+maps. The offices are those of the suites, from seed 100 on.
 """
 
 from __future__ import annotations
 
-import time
+import resource
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import islice
+from multiprocessing import get_context
 
 import numpy as np
 import shapely
 
-from benchmarks.reporting import command_line
+from benchmarks.first_plan import CpuDeadline, timed_plan
+from benchmarks.reporting import command_line, head, origin, row, write
 from pushplan.drawing.figure import COLUMN, DPI, STYLE
 from pushplan.drawing.palette import DASHES, MARKERS
-from pushplan.planners import make_planner
+from pushplan.envs import make
+from pushplan.scenarios import suite
+from pushplan.scenarios.office import start_and_goal
 from pushplan.world import (
-    Deadline,
     FirstSolution,
     GoalDisc,
     Movables,
@@ -31,7 +40,9 @@ from pushplan.world import (
 from pushplan.world.checks import BoolArray, FloatArray
 
 PLANNERS = ("straight", "kinodynamic-rrt", "push-aware", "skeleton", "geometric-rrt")
-PATIENCE = 1.0  # [s]
+PATIENCE = CpuDeadline(1.0)
+SAME = 3  # later calls on a map
+LAST = ("after 1 s: cost", "peak memory [MB]")
 ROBOT = jackal(drive="differential")
 MakeMap = Callable[[np.random.Generator], StaticMap]
 
@@ -131,42 +142,66 @@ def worlds(make_map: MakeMap, objects: int, seed: int) -> Iterator[World]:
         )
 
 
-def first_plan(name: str, world: World, seed: int) -> float:
-    """CPU time until the first plan [s], infinite if there is none."""
-    planner = make_planner(name)
+def office_worlds(name: str, seed: int) -> Iterator[World]:
+    """The scene of a suite, and others between other places of the same office."""
+    env = make(suite(name, episodes=1, first_seed=100 + seed).scenarios[0], observation="state")
+    env.reset()
+    world = env.world
     rng = np.random.default_rng(seed)
-    began = time.thread_time()
-    result = planner.plan(world, stop=FirstSolution() | Deadline(PATIENCE), rng=rng)
-    return time.thread_time() - began if result.plan is not None else np.inf
+    while True:
+        yield world
+        start, end = start_and_goal(rng, world.static, world.movables, world.robot)
+        world = replace(world, robot_pose=start, goal=GoalDisc(end, 0.25))
 
 
-def measure(name: str, make_map: MakeMap, objects: int, calls: int) -> tuple[FloatArray, ...]:
-    """CPU times [s] of first calls on new maps, and of three later calls on each."""
-    new = []
-    same = []
-    for seed in range(calls):
-        scenes = worlds(make_map, objects, seed)
-        new.append(first_plan(name, next(scenes), seed))
-        same += [first_plan(name, next(scenes), seed) for _ in range(3)]
-    return np.array(new), np.array(same)
+@dataclass(frozen=True)
+class Measured:
+    """Times of a planner in one case, infinite without a plan."""
+
+    new: FloatArray  # CPU time of first calls on a map [s]
+    same: FloatArray  # of later calls
+    ratio: float  # median cost of plans after a second over that of the first plans
+    peak_mb: float  # memory of a process that does nothing else
 
 
-def line(name: str, case: str, times: tuple[FloatArray, ...]) -> str:
-    """A row: median, 95th percentile and worst of both, and how many calls had a plan."""
-    cells = []
-    for values in times:
-        at = np.percentile(values, [50, 95, 100], method="higher") * 1e3
-        solved = int(np.isfinite(values).sum())
-        cells.append(" / ".join(f"{v:.0f}" for v in at) + f" ({solved} of {len(values)})")
-    return f"| {case} | `{name}` | " + " | ".join(cells) + " |"
+def measure(name: str, scenes: Callable[[int], Iterator[World]], maps: int) -> Measured:
+    """Plan on new maps, three more times on each, and then on the first scene for a second."""
+    small = next(worlds(partial(posts, 50), 5, 0))
+    timed_plan(name, small, FirstSolution() | PATIENCE, 0)  # imports what it needs
+    times = np.full((maps, 1 + SAME), np.inf)
+    ratios = np.full(maps, np.nan)
+    for seed in range(maps):
+        some = list(islice(scenes(seed), 1 + SAME))
+        plans = []
+        for k, world in enumerate(some):
+            times[seed, k], result = timed_plan(name, world, FirstSolution() | PATIENCE, seed)
+            plans.append(result.plan)
+        later = timed_plan(name, some[0], PATIENCE, seed)[1].plan
+        if plans[0] is not None and later is not None:
+            ratios[seed] = later.cost / plans[0].cost
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
+    return Measured(times[:, 0], times[:, 1:].ravel(), float(np.nanmedian(ratios)), peak)
 
 
-CASES: dict[str, tuple[MakeMap, int]] = {
-    "2,000 polygons": (lambda rng: posts(2000, rng), 0),
-    "2,000 polygons, 20 objects": (lambda rng: posts(2000, rng), 20),
-    "office of 10,000 cells": (lambda rng: office(10_000, rng), 0),
-    "office, 10,000 square polygons": (lambda rng: office_squares(10_000, rng), 0),
-    "1,000 objects": (hall, 1000),
+def measure_case(name: str, case: str, maps: int) -> Measured:
+    """`measure` in a process of its own, so that its memory is that of this case."""
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        return pool.submit(measure, name, CASES[case], maps).result()
+
+
+def cell(times: FloatArray) -> str:
+    """Median, 95th percentile and worst of times [ms], and how many calls had a plan."""
+    at = np.percentile(times, [50, 95, 100], method="higher") * 1e3
+    return " / ".join(f"{v:.0f}" for v in at) + f" ({np.isfinite(times).sum()} of {len(times)})"
+
+
+CASES: dict[str, Callable[[int], Iterator[World]]] = {
+    "2,000 polygons": partial(worlds, partial(posts, 2000), 0),
+    "2,000 polygons, 20 objects": partial(worlds, partial(posts, 2000), 20),
+    "office of 10,000 cells": partial(worlds, partial(office, 10_000), 0),
+    "office, 10,000 square polygons": partial(worlds, partial(office_squares, 10_000), 0),
+    "1,000 objects": partial(worlds, hall, 1000),
+    **{name: partial(office_worlds, name) for name in ("office-1k", "office-2k", "office-5k")},
 }
 
 
@@ -176,16 +211,16 @@ def draw_growth(path: str, planners: Sequence[str], calls: int) -> None:
 
     plt.rcParams.update(STYLE)
     counts = {"polygons": (125, 250, 500, 1000, 2000, 4000), "objects": (0, 125, 250, 500, 1000)}
-    makers: dict[str, Callable[[int], tuple[MakeMap, int]]] = {
-        "polygons": lambda count: (lambda rng: posts(count, rng), 0),
-        "objects": lambda count: (hall, count),
+    makers: dict[str, Callable[[int], Callable[[int], Iterator[World]]]] = {
+        "polygons": lambda count: partial(worlds, partial(posts, count), 0),
+        "objects": lambda count: partial(worlds, hall, count),
     }
     figure, axes = plt.subplots(
         1, 2, figsize=(2.0 * COLUMN, 2.6), layout="constrained", sharey=True
     )
     for axis, (kind, numbers) in zip(axes, counts.items(), strict=True):
         for name in planners:
-            times = [measure(name, *makers[kind](count), calls)[0] for count in numbers]
+            times = [measure(name, makers[kind](count), calls).new for count in numbers]
             middle = [1e3 * np.percentile(values, 50, method="higher") for values in times]
             index = planners.index(name)
             axis.plot(numbers, middle, label=name, linestyle=DASHES[index], marker=MARKERS[index])
@@ -211,11 +246,13 @@ def main() -> None:
     planners = options.planner or PLANNERS
     if options.figure:
         return draw_growth(options.figure, planners, options.calls)
-    print("| map | planner | new map: median / p95 / worst [ms] | same map |\n|---|---|---|---|")
+    write(origin(), "")
+    head("map", "planner", "new map: median / p95 / worst [ms]", "same map", *LAST)
     for case in options.case or CASES:
-        make_map, objects = CASES[case]
         for name in planners:
-            print(line(name, case, measure(name, make_map, objects, options.calls)), flush=True)
+            found = measure_case(name, case, options.calls)
+            cells = cell(found.new), cell(found.same), f"{found.ratio:.3f}", f"{found.peak_mb:.0f}"
+            row(case, f"`{name}`", *cells)
 
 
 if __name__ == "__main__":

@@ -424,6 +424,7 @@ void bind_path_search(nb::module_& module) {
             new (self) GoalEstimate(cells, scene.regions, point(start));
           },
           "cells"_a, "scene"_a, "start"_a.noconvert(), nb::keep_alive<1, 2>(), ReleaseGil())
+      .def("run", &GoalEstimate::run, "cells"_a, ReleaseGil())
       .def(
           "at", [](const GoalEstimate& s, double x, double y) { return s.from({x, y}); }, "x"_a,
           "y"_a);

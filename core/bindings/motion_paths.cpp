@@ -209,7 +209,7 @@ struct OwnRoomExploration {
 
 void bind_ways_out(nb::module_& module) {
   module.def(
-      "fill_cell_weights",
+      "add_cell_weights",
       [](const FloatsOut<2>& out, double x, double y, double cell, const Points& vertices,
          const Integers<1>& offsets, const Integers<2>& within, const Floats<1>& reach,
          const Floats<1>& weight) {
@@ -217,8 +217,8 @@ void bind_ways_out(nb::module_& module) {
         require_count("within", within.shape(0), shapes.count());
         require_count("reach", reach.shape(0), shapes.count());
         require_count("weight", weight.shape(0), shapes.count());
-        fill_cell_weights(view(out), {{x, y}, cell}, shapes, rows_as<const CellBox>(within),
-                          {view(reach), view(weight)});
+        add_cell_weights(view(out), {{x, y}, cell}, shapes, rows_as<const CellBox>(within),
+                         {view(reach), view(weight)});
       },
       "out"_a.noconvert(), "x"_a, "y"_a, "cell"_a, "vertices"_a.noconvert(),
       "offsets"_a.noconvert(), "within"_a.noconvert(), "reach"_a.noconvert(),

@@ -21,6 +21,7 @@ from pushplan.runtime import Command, CommandStatus, RunLog, Runner
 from pushplan.world import (
     Deadline,
     GoalDisc,
+    GoalPose,
     InvalidInputError,
     OwnBudget,
     Plan,
@@ -81,6 +82,7 @@ class Navigator:
         budget: of a call of `compute_path` [s].
         tolerance: how near to the goal the robot has to come [m]: one half is for the path, the
             other one for driving it.
+        heading_tolerance: the same of its heading at the goal [rad]; 0 where that is not asked for.
         patience: after how long without getting on, and without a command that can be driven, a
             path is given up [s].
         max_age: odometry that is older stops the robot [s].
@@ -100,6 +102,7 @@ class Navigator:
         controller: str = PATH,
         budget: float = 1.0,
         tolerance: float = 0.1,
+        heading_tolerance: float = 0.0,
         patience: tuple[float, float] = (10.0, 1.0),
         max_age: float = 0.5,
         log: RunLog | None = None,
@@ -107,6 +110,7 @@ class Navigator:
         self.scene, self.messages = scene, messages
         self.planner, self.controller = planner, controller
         self.budget, self.tolerance, self.patience = budget, tolerance, patience
+        self.heading_tolerance = heading_tolerance
         self._runner_options: dict[str, Any] = {"period": period, "max_age": max_age, "log": log}
         self._max_age = max_age
         self._runners: dict[str, Runner] = {}
@@ -138,7 +142,7 @@ class Navigator:
         """Serve ComputePathToPose.
 
         Args:
-            goal: ``geometry_msgs/PoseStamped``; its heading is not asked for.
+            goal: ``geometry_msgs/PoseStamped``.
             start: the same, or None for where the robot is.
             planner_id: one of `PLANNERS`; the default one if empty or ``GridBased``.
             stop: a token that cancels the call.
@@ -150,12 +154,12 @@ class Navigator:
             NavigationError: if there is none.
         """
         name = self._named("planner", planner_id)
-        disc = self._disc(self._pose(goal))
-        world = self.scene.world(disc)
+        end = self._goal_at(self._pose(goal))
+        world = self.scene.world(end)
         if start is not None:
             world = world.moved(robot_pose=self._pose(start), robot_twist=np.zeros(3))
         _check_inside(world, "START", world.robot_pose[:2])
-        _check_inside(world, "GOAL", disc.center)
+        _check_inside(world, "GOAL", end.center)
         rule, began = OwnBudget() | Deadline(self.budget), time.perf_counter()
         try:
             result = make_planner(name).plan(
@@ -166,7 +170,7 @@ class Navigator:
         status = result.status
         if result.plan is None or status is PlanStatus.APPROXIMATE:
             code = _CODES.get(status, "NO_VALID_PATH")
-            if status is PlanStatus.GOAL_UNREACHABLE and _is_occupied(world, disc.center):
+            if status is PlanStatus.GOAL_UNREACHABLE and _is_occupied(world, end.center):
                 code = "GOAL_OCCUPIED"
             raise NavigationError(code, f"{status.label}: {status.remedy}")
         return self.messages.path(result.plan, world.time), time.perf_counter() - began
@@ -188,7 +192,7 @@ class Navigator:
             plan = plan_from(path, robot, frame)
         except InvalidInputError as error:
             raise NavigationError("INVALID_PATH", str(error)) from error
-        end = self._disc(plan.poses[-1])
+        end = self._goal_at(plan.poses[-1])
         # a path may pass its own end, so that the runner is not told of it: see `_has_arrived`
         goal = GoalDisc(end.center + _FAR_AWAY, end.radius) if name == PATH else end
         world = self.scene.world(goal)
@@ -272,8 +276,7 @@ class Navigator:
 
     def _has_arrived(self, world: World, left: float) -> bool:
         """Whether the robot has driven the given path, and is at its end."""
-        x, y = world.robot_pose[:2].tolist()
-        there = self._end_of_path.distance(x, y) == 0.0
+        there = self._end_of_path.reached_by(world.robot_pose)
         return self._driven == PATH and there and left <= self.tolerance
 
     def _end(self, code: str, reason: str) -> None:
@@ -294,7 +297,11 @@ class Navigator:
     def _is_on_its_way_to(self, goal: GoalDisc) -> bool:
         if self._goal is None or self._outcome[0]:
             return False
-        return math.dist(self._goal.center, goal.center) <= self.tolerance
+        turned = 0.0
+        if isinstance(self._goal, GoalPose) and isinstance(goal, GoalPose):
+            turned = abs(self._goal.heading_error(goal.heading))
+        near = math.dist(self._goal.center, goal.center) <= self.tolerance
+        return near and turned <= self.heading_tolerance
 
     def _runner(self, name: str) -> Runner:
         if name not in self._runners:
@@ -313,7 +320,9 @@ class Navigator:
         except InvalidInputError as error:
             raise NavigationError("TF_ERROR", str(error)) from error
 
-    def _disc(self, pose: FloatArray) -> GoalDisc:
+    def _goal_at(self, pose: FloatArray) -> GoalDisc:
+        if self.heading_tolerance > 0.0:
+            return GoalPose(pose[:2], 0.5 * self.tolerance, pose[2], 0.5 * self.heading_tolerance)
         return GoalDisc(pose[:2], 0.5 * self.tolerance)
 
 

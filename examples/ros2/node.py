@@ -69,6 +69,7 @@ class PushplanNode(Node):  # type: ignore[misc]
             controller=self._value("controller", PATH),
             budget=self._value("budget", 1.0),
             tolerance=self._value("tolerance", 0.1),
+            heading_tolerance=self._value("heading_tolerance", 0.0),
             patience=(
                 self._value("movement_time_allowance", 10.0),
                 self._value("failure_tolerance", 1.0),

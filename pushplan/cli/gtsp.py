@@ -6,15 +6,21 @@ import argparse
 
 from pushplan.cli.common import milliseconds, say
 from pushplan.cli.output_files import check_file
+from pushplan.errors import InvalidInputError
 
 
 def run(options: argparse.Namespace) -> int:
     """Read, solve, say what was found; 1 if there is no tour."""
-    from pushplan.gtsp import GtspConfig, read_gtsp, solve_gtsp, write_tour
+    from pushplan.gtsp import GtspConfig, read_gtsp, read_tour, solve_gtsp, write_tour
     from pushplan.world import Deadline, MaxIterations, Stop, stream
 
     check_file(options.out)
     instance = read_gtsp(options.file)
+    for node in options.fixed_start:
+        if node > len(instance.costs):
+            raise InvalidInputError(
+                f"--fixed-start has node {node}, but nodes are 1 to {len(instance.costs)}"
+            )
     if options.iterations:
         stop: Stop = MaxIterations(options.iterations)
     else:
@@ -25,6 +31,8 @@ def run(options: argparse.Namespace) -> int:
         stop=stop,
         rng=stream(options.seed, "gtsp"),
         config=GtspConfig(method=options.method, lower_bound=options.bound),
+        initial=read_tour(options.initial) if options.initial else None,
+        fixed_start=[node - 1 for node in options.fixed_start],
     )
     say(f"{instance.name}: {len(instance.costs)} nodes in {len(instance.clusters)} clusters")
     stats = tour.stats

@@ -12,7 +12,7 @@ import numpy as np
 from pushplan.control.episode_clock import EpisodeClock
 from pushplan.control.limits import approach_speed, ramp_twist
 from pushplan.control.tracking import Progress
-from pushplan.world import Plan, RobotModel, Stage, Twist, World
+from pushplan.world import GoalPose, Plan, RobotModel, Stage, Twist, World
 from pushplan.world.checks import expect
 
 _WINDOW = 2.0  # of its progress [circumscribed radii]
@@ -22,9 +22,9 @@ class StagedController(ABC):
     """Drives a plan stage by stage: turns by itself, the rest as its kind of controller does.
 
     Of a stage that goes back `_follow` sees the mirror image: a robot whose front is its rear, on a
-    path that it drives ahead. Before a stage that another one follows is over, the robot slows
-    down so that it comes to a stand there. Of a plan of one stage that is driven ahead it sees the
-    plan as it is.
+    path that it drives ahead. Before a stage that another one follows is over, and before a pose
+    that is the robot's goal, it slows down so that it comes to a stand there. Of a plan of one
+    stage that is driven ahead it sees the plan as it is.
     """
 
     @abstractmethod
@@ -65,7 +65,8 @@ class StagedController(ABC):
         return self._clock.command_for(world, lambda _: self._by_stages(world, plan))
 
     def _by_stages(self, world: World, plan: Plan) -> Twist:
-        if len(plan.stages) == 1 and plan.stages[0].direction == 1:
+        simple = len(plan.stages) == 1 and plan.stages[0].direction == 1
+        if simple and not isinstance(world.goal, GoalPose):
             self._take_up(1)
             return self._follow(world, plan)
         robot = world.robot
@@ -103,7 +104,7 @@ class StagedController(ABC):
             wanted = Twist(-twist.linear, twist.angular)
         else:
             wanted = self._follow(world, self._part)
-        if progress.is_last:
+        if progress.is_last and not (world.robot.can_stop and isinstance(world.goal, GoalPose)):
             return wanted
         fastest = approach_speed(progress.left_of_stage, robot.max_acceleration, held)
         if abs(wanted.linear) <= fastest:

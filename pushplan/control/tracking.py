@@ -14,6 +14,8 @@ _AWAY = 0.25  # a robot that is farther from where it turns has turned [windows]
 ALIGNED = math.radians(2.0)
 """Heading error at which a turn on the spot is finished [rad]."""
 
+_TURNED = 1e-3  # angle that may be left of a turn at the end of a plan [rad]
+
 
 class Progress:
     """Position of the robot along its plan; never jumps to another branch of the same path.
@@ -105,6 +107,12 @@ class Progress:
     def total(self) -> float:
         """Length of the plan [m]."""
         return float(self._lengths[-1])
+
+    @property
+    def is_over(self) -> bool:
+        """True if the robot is at the end of the plan, and has turned there as it says."""
+        turns = self.stage.direction == 0 and self.left_to_turn > _TURNED
+        return self.along >= self.total - 1e-9 and not turns
 
     @property
     def left_of_stage(self) -> float:

@@ -9,7 +9,7 @@ from PIL import Image
 
 from pushplan.drawing.canvas import Canvas
 from pushplan.drawing.palette import Palette
-from pushplan.world import ClearanceArea, Goal, GoalDisc, GoalLine, StaticMap
+from pushplan.world import ClearanceArea, Goal, GoalDisc, GoalLine, GoalPose, StaticMap
 from pushplan.world.checks import FloatArray
 
 Bounds = tuple[float, ...]
@@ -38,6 +38,8 @@ def draw_ground(canvas: Canvas, static: StaticMap, goal: Goal, palette: Palette)
     fill, edge = palette.goal
     if isinstance(goal, GoalDisc):
         canvas.disc(goal.center, goal.radius, fill, edge, 1.5)
+        if isinstance(goal, GoalPose):
+            canvas.polygon(heading_arrow(goal, max(goal.radius, canvas.metres(14.0))), edge, edge)
     elif isinstance(goal, GoalLine):
         reach = 2.0 * float(np.hypot(*(static.bounds[2:] - static.bounds[:2])))
         along = reach * np.array([-goal.normal[1], goal.normal[0]])
@@ -54,6 +56,13 @@ def draw_ground(canvas: Canvas, static: StaticMap, goal: Goal, palette: Palette)
         canvas.polygon(polygon, palette.wall, palette.wall)
     for line, radius in zip(static.segments, static.radii, strict=True):
         canvas.thick_segment(line, max(float(radius), canvas.metres(1.5)), palette.wall)
+
+
+def heading_arrow(goal: GoalPose, length: float) -> FloatArray:
+    """(3, 2) corners of an arrow head [m] from the middle of a goal along its heading."""
+    ahead = length * np.array([np.cos(goal.heading), np.sin(goal.heading)])
+    aside = 0.35 * np.array([-ahead[1], ahead[0]])
+    return np.array([goal.center + aside, goal.center - aside, goal.center + ahead])
 
 
 def _clearance_area(canvas: Canvas, goal: ClearanceArea, palette: Palette) -> None:

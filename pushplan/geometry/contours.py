@@ -18,6 +18,10 @@ from pushplan.world.outline import next_corner
 
 ARC_STEP = math.pi / 36.0
 """Turn per corner where a round outline becomes a polygon [rad]; an arc gets 0.06 % longer."""
+COARSE = 3.0
+"""Factor on it where the obstacles have more than `MANY_CORNERS`: an arc gets 0.6 % longer."""
+MANY_CORNERS = 2_200
+"""Corners of obstacles from which on a path that is nearly the shortest is good enough."""
 SMALL_RADIUS = 1e-3
 """Arcs below this fraction of the map's diagonal get fewer corners: the same error in metres."""
 GAP = 1e-7
@@ -47,10 +51,20 @@ def gap_of(static: StaticMap) -> float:
 
 def standoff_of(static: StaticMap, clearance: float) -> float:
     """Greatest distance [m] of a contour polygon from the outline that it is drawn around."""
-    radius = max(float(obstacles_of(static, clearance).radii.max(initial=0.0)), 0.0)
+    shapes = obstacles_of(static, clearance)
+    radius = max(float(shapes.radii.max(initial=0.0)), 0.0)
     # 1 / cos(step / 2) - 1, which is step² / 8 for small steps and 1.35 times that at the coarsest
-    fraction = 1.5 * ARC_STEP**2 / 8.0
+    fraction = 1.5 * _arc_step(shapes) ** 2 / 8.0
     return fraction * max(radius, SMALL_RADIUS * _diagonal(static)) + 4.0 * gap_of(static)
+
+
+def has_many_corners(shapes: core.Obstacles) -> bool:
+    """Return True for a map on which speed counts for more than the last percent of length."""
+    return len(shapes.vertices) > MANY_CORNERS
+
+
+def _arc_step(shapes: core.Obstacles) -> float:
+    return ARC_STEP * (COARSE if has_many_corners(shapes) else 1.0)
 
 
 def _diagonal(static: StaticMap) -> float:
@@ -64,7 +78,8 @@ class _ContourMaker:
         self._shapes = obstacles_of(static, clearance)
         diagonal = _diagonal(static)
         small = SMALL_RADIUS * diagonal / np.maximum(self._shapes.radii, 1e-300)
-        self._steps = np.minimum(math.pi / 2.0, ARC_STEP * np.sqrt(np.maximum(1.0, small)))
+        steps = _arc_step(self._shapes) * np.sqrt(np.maximum(1.0, small))
+        self._steps = np.minimum(math.pi / 2.0, steps)
         self._radii = self._shapes.radii + 2.0 * gap_of(static)
         self._parts: list[Contours] = []
         self._done = self._corners = 0

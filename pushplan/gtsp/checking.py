@@ -145,3 +145,66 @@ def graph_instance(graph: nx.Graph[Any]) -> tuple[list[Any], FloatArray, list[li
             )
         clusters.setdefault(cluster, []).append(place)
     return list(graph), costs, list(clusters.values())
+
+
+def checked_nodes(label: str, nodes: object, names: Sequence[Any], size: int) -> IntArray:
+    """Nodes that a caller names, as numbers.
+
+    Args:
+        label: name of the argument.
+        nodes: the nodes.
+        names: of all nodes, where the caller has given a graph; else empty.
+        size: N.
+
+    Raises:
+        InvalidInputError: if one is no node, or is there twice.
+    """
+    if isinstance(nodes, str | bytes) or not hasattr(nodes, "__iter__"):
+        raise InvalidInputError(f"{label} must be a sequence of nodes, got {short(nodes)}")
+    places = {name: place for place, name in enumerate(names or range(size))}
+    found: list[int] = []
+    for node in nodes:
+        if isinstance(node, bool) or not isinstance(node, Hashable) or node not in places:
+            valid = "those of the graph" if names else f"0 to {size - 1}"
+            raise InvalidInputError(f"{label} has node {short(node)}, but nodes are {valid}")
+        if places[node] in found:
+            raise InvalidInputError(f"{label} has node {short(node)} twice")
+        found.append(places[node])
+    return np.array(found, dtype=np.int64)
+
+
+def check_tour(
+    label: str,
+    nodes: IntArray,
+    costs: NDArray[np.number],
+    clusters: Sequence[IntArray],
+    *,
+    closed: bool = False,
+) -> None:
+    """Check that nodes lie in different clusters, and with ``closed`` are a tour.
+
+    Args:
+        label: name of the argument.
+        nodes: in visiting order.
+        costs: (N, N).
+        clusters: the nodes of each.
+        closed: every cluster has to be visited, over arcs that are not forbidden.
+
+    Raises:
+        InvalidInputError: naming what is wrong first.
+    """
+    owner = np.empty(len(costs), dtype=np.int64)
+    for index, members in enumerate(clusters):
+        owner[members] = index
+    visits = np.bincount(owner[nodes], minlength=len(clusters))
+    if visits.max(initial=0) > 1:
+        raise InvalidInputError(f"{label} visits cluster {int(visits.argmax())} more than once")
+    if not closed:
+        return
+    if not visits.all():
+        raise InvalidInputError(f"{label} does not visit cluster {int(visits.argmin())}")
+    forbidden = costs[nodes, np.roll(nodes, -1)] == np.inf
+    if forbidden.any() and len(nodes) > 1:
+        at = int(forbidden.argmax())
+        following = nodes[(at + 1) % len(nodes)]
+        raise InvalidInputError(f"{label} uses the forbidden arc {nodes[at]} to {following}")

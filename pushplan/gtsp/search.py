@@ -219,6 +219,11 @@ class AnytimeSearch:
         if self.tour.best_cost < self.budget.cost:
             self.budget.note(tour_cost(self.problem.costs, self.tour.best_nodes))
 
+    def begin_with(self, order: IntArray) -> None:
+        """Make an order of the clusters, with its cheapest nodes, the best one so far."""
+        self.tour.start(np.roll(order, -int((order == self.problem.root).argmax())))
+        self._note_best()
+
     def _random_start(self) -> None:
         problem = self.problem
         tour = self.tour
@@ -229,21 +234,31 @@ class AnytimeSearch:
 
 
 def search(
-    problem: Problem, config: GtspConfig, seed: int, budget: Budget, fraction: float
+    problem: Problem,
+    config: GtspConfig,
+    seed: int,
+    budget: Budget,
+    fraction: float,
+    initial: IntArray | None = None,
 ) -> IntArray:
     """The best order of clusters that a fraction of the budget allows.
 
-    Its tour uses a forbidden arc only if no tour without one was found.
+    Its tour uses a forbidden arc only if no tour without one was found. The first run begins from
+    an initial order, at the temperatures of a run from the best tour.
     """
     state = AnytimeSearch(problem, config, seed, budget)
+    warm = initial is not None
+    if initial is not None:
+        state.begin_with(initial)
     length = max(fraction - budget.gone(), 1e-9) / state.runs_in(fraction)
     left = fraction
     whole = 0.0
     runs = 0
-    while runs == 0 or (left > 0.0 and not budget.stopped()):
+    while (runs == 0 and initial is None) or (left > 0.0 and not budget.stopped()):
         begin = min(budget.gone(), fraction)
         left = fraction - begin
-        again = runs > 0 and left < config.whole * whole / runs
+        again = warm or (runs > 0 and left < config.whole * whole / runs)
+        warm = False
         state.run(begin, begin + left / max(1, round(left / length)), again)
         left = fraction - budget.gone()
         if not again:  # it may have ended early

@@ -11,7 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pushplan.errors import InvalidInputError
-from pushplan.gtsp.checking import checked_clusters, checked_costs, graph_instance
+from pushplan.gtsp.checking import (
+    check_tour,
+    checked_clusters,
+    checked_costs,
+    checked_nodes,
+    graph_instance,
+)
 from pushplan.gtsp.exact import expected_seconds, solve_exactly, table_mb
 from pushplan.gtsp.gtsp_config import GtspConfig
 from pushplan.gtsp.large import best_choice, promising
@@ -44,6 +50,8 @@ def solve_gtsp(
     stop: Stop | None = None,
     rng: np.random.Generator | None = None,
     config: GtspConfig = _DEFAULT,
+    initial: Tour | Sequence[Any] | None = None,
+    fixed_start: int | Sequence[Any] = (),
 ) -> Tour:
     """A cheap closed tour through one node of every cluster.
 
@@ -58,14 +66,19 @@ def solve_gtsp(
             the same on every machine. Without a rule, ``config.iterations`` rounds.
         rng: of the search; the same numbers every time by default.
         config: parameters.
+        initial: a tour to begin with, one node of each cluster in visiting order, from whichever
+            on. The result costs no more, and with a stop rule that has fired already it is this.
+        fixed_start: a node, or nodes in this order, with which every tour begins; the optimum and
+            its bounds are those of such tours.
 
     Returns:
         The tour, its status and what is known of the optimum. Of a graph, the nodes of the tour
         are its nodes.
 
     Raises:
-        InvalidInputError: for input that breaks a rule, or where ``method="exact"`` would need
-            more memory than ``config.memory_mb``.
+        InvalidInputError: for input that breaks a rule, an initial tour that is none or begins
+            otherwise than ``fixed_start``, or where ``method="exact"`` would need more memory than
+            ``config.memory_mb``.
     """
     check_rules(stop, rng)
     budget = Budget.start(stop, config.iterations)
@@ -76,12 +89,69 @@ def solve_gtsp(
         names, costs, clusters = graph_instance(costs)
     matrix = checked_costs(costs)
     members = checked_clusters(clusters, len(matrix))
+    if isinstance(fixed_start, int | np.integer):
+        fixed_start = [fixed_start]
+    start = checked_nodes("fixed_start", fixed_start, names, len(matrix))
+    check_tour("fixed_start", start, matrix, members)
+    given: IntArray | None = None
+    if initial is not None:
+        begin = initial.nodes if isinstance(initial, Tour) else initial
+        given = checked_nodes("initial", begin, names, len(matrix))
+        check_tour("initial", given, matrix, members, closed=True)
+        given = _beginning_in(given, start[:1] if len(start) else members[0])
+        if (given[: len(start)] != start).any():
+            raise InvalidInputError("initial must visit the nodes of fixed_start in this order")
+        budget.note(tour_cost(matrix, given))
     seed = (np.random.default_rng(0) if rng is None else rng).integers(1, 2**63)
-    call = _SolverCall(matrix, members, int(seed), budget, stop, config)
+    call = _SolverCall(*_contracted(matrix, members, start), int(seed), budget, stop, config)
+    if given is not None:
+        call.initial = np.delete(given, np.arange(1, len(start)))
     tour = call.solve()
+    if len(start) > 1 and tour.nodes:
+        nodes = np.array([*start, *tour.nodes[1:]])
+        cost = tour_cost(matrix, nodes)
+        if cost == math.inf:  # all nodes are fixed
+            return Tour((), math.inf, math.inf, TourStatus.INFEASIBLE, tour.stats)
+        bound = min(tour.lower_bound, cost)
+        if tour.status is TourStatus.OPTIMAL:
+            bound = cost
+        tour = replace(tour, nodes=tuple(nodes.tolist()), cost=cost, lower_bound=bound)
+    if given is not None and tour_cost(matrix, given) < tour.cost:
+        tour = _given(tour, given, tour_cost(matrix, given))
     if names:
         tour = replace(tour, nodes=tuple(names[node] for node in tour.nodes))
     return tour
+
+
+def _beginning_in(nodes: IntArray, first: IntArray) -> IntArray:
+    """A closed tour from the first of its nodes on that is one of these, if one is."""
+    return np.roll(nodes, -int(np.isin(nodes, first).argmax()))
+
+
+def _contracted(
+    costs: NDArray[np.number], members: tuple[IntArray, ...], start: IntArray
+) -> tuple[NDArray[np.number], tuple[IntArray, ...]]:
+    """The problem with one node in place of those that every tour begins with.
+
+    The node is entered as the first of them and left as the last, at the cost of all arcs between.
+    """
+    if not len(start):
+        return costs, members
+    others = tuple(nodes for nodes in members if not np.isin(nodes, start).any())
+    if len(start) > 1:
+        between = costs[start[:-1], start[1:]].sum()
+        costs = costs.copy()
+        costs[start[0]] = costs[start[-1]] + between
+    return costs, (start[:1], *others)
+
+
+def _given(tour: Tour, nodes: IntArray, cost: float) -> Tour:
+    """The tour that was given, where the result of the call costs more or there is none."""
+    status = tour.status
+    if status is not TourStatus.OPTIMAL:
+        status = TourStatus.FEASIBLE
+    bound = min(tour.lower_bound, cost)
+    return Tour(tuple(nodes.tolist()), cost, bound, status, replace(tour.stats, best_s=0.0))
 
 
 @dataclass
@@ -94,6 +164,7 @@ class _SolverCall:
     budget: Budget
     stop: Stop | None
     config: GtspConfig
+    initial: IntArray | None = None
     method: str = "none"
     detail: dict[str, float] = field(default_factory=dict)
 
@@ -160,8 +231,14 @@ class _SolverCall:
         budget = self.budget
         prove_it = config.lower_bound and everything is None
         timed = prove_it and budget.seconds < math.inf
+        begin: IntArray | None = None
+        if self.initial is not None:
+            owner = np.zeros(len(self.costs), dtype=np.int64)
+            for index, cluster in enumerate(self.members):
+                owner[cluster] = index
+            begin = owner[self.initial]
         order = search(
-            problem, config, self.seed, budget, 1.0 - config.proof_fraction if timed else 1.0
+            problem, config, self.seed, budget, 1.0 - config.proof_fraction if timed else 1.0, begin
         )
         if everything is not None:
             nodes = best_choice(self.costs, [everything[c] for c in order])
@@ -187,11 +264,8 @@ class _SolverCall:
         if cost == math.inf:
             return self._failed()
         self.budget.note(cost)
-        order = nodes.tolist()
-        begin = set(self.members[0].tolist())
-        first = next(place for place, node in enumerate(order) if node in begin)
         return Tour(
-            (*order[first:], *order[:first]),
+            tuple(_beginning_in(nodes, self.members[0]).tolist()),
             cost,
             cost if proven else min(bound, cost),
             TourStatus.OPTIMAL if proven else TourStatus.FEASIBLE,

@@ -90,7 +90,7 @@ class FeatureObservation(LimitedVector, CheckedFields):
         at = world.robot_pose[:2]
         goal = world.goal
         if isinstance(goal, GoalDisc | GoalLine):
-            ahead, length = _way(world.static, goal, world.robot.inscribed_radius, at)
+            ahead, length = _way(world.static, world.place_goal, world.robot.inscribed_radius, at)
             out[:4] = ((ahead - at) @ to_body).ravel()
             out[4] = length / self.range
             out[7] = 1.0

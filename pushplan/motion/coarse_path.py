@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import threading
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -17,6 +18,7 @@ from pushplan.world.outline import flatten, outline_boxes
 
 _SIDE = 96  # cells along the longer side of the workspace, if that resolves the robot's own width
 _MOST = 400  # cells along the longer side at most
+_PIECE = 300  # walls between two looks at a stop rule
 
 
 def _cell(world: World) -> float:
@@ -45,14 +47,18 @@ def coarse_path(
     outer = robot.circumscribed_radius
     cell = _cell(world)
     # walls hold the inscribed disc for certain; the rest of the footprint is a matter of heading
-    walls = _wall_weights(keep_out(world), cell, ((inner, np.inf), (1.3 * outer, 2.0)))
+    terms = (inner, np.inf), (1.3 * outer, 2.0)
+    walls = _wall_weights(keep_out(world), cell, terms).make(stopped)
+    if walls is None:
+        return np.empty((0, 2))
     # passing through the middle of a box pushes it for about a robot's width
     per_metre = push_weight * objects.masses / robot.mass
     boxes = objects.every_part_world
     reach = np.full(len(boxes), outer)
     weights = per_metre[objects.part_owners]
-    extra = walls + _grid_weights(world.static.bounds, cell, boxes, reach, weights)
-    return _cheapest(world, extra, cell, stopped)
+    extra = _no_weights(world.static.bounds, cell)
+    _add_weights(extra, world.static.bounds, cell, boxes, reach, weights)
+    return _cheapest(world, walls + extra, cell, stopped)
 
 
 def reachable(world: World, stopped: Callable[[], bool] = never) -> bool:
@@ -65,39 +71,67 @@ def reachable(world: World, stopped: Callable[[], bool] = never) -> bool:
     if cell > inner:
         return True  # too coarse to tell
     # a cell less than the disc: a narrow gap is left for the search to find out about
-    extra = _wall_weights(keep_out(world), cell, ((inner - cell, np.inf),))
-    return len(_cheapest(world, extra, cell, stopped)) > 0
+    extra = _wall_weights(keep_out(world), cell, ((inner - cell, np.inf),)).make(stopped)
+    return extra is None or len(_cheapest(world, extra, cell, stopped)) > 0
 
 
-@functools.lru_cache(maxsize=16)
-def _wall_weights(
-    static: StaticMap, cell: float, terms: tuple[tuple[float, float], ...]
-) -> FloatArray:
-    """Extra cost per metre of each cell from walls alone, one term for each reach and weight."""
-    parts = list(static.convex_parts)
-    count = len(parts)
-    weights = [
-        _grid_weights(static.bounds, cell, parts, np.full(count, reach), np.full(count, weight))
-        for reach, weight in terms
-    ]
-    return frozen(np.sum(weights, axis=0))
+class _WallWeights:
+    """Extra cost per metre of each cell from walls, one term for each reach [m] and weight.
+
+    They are made in small steps; what is done is kept.
+    """
+
+    def __init__(
+        self, static: StaticMap, cell: float, terms: tuple[tuple[float, float], ...]
+    ) -> None:
+        self._static = static
+        self._cell = cell
+        self._terms = terms
+        self._made = [_no_weights(static.bounds, cell) for _ in terms]
+        self._done = 0
+        self._lock = threading.Lock()
+
+    def make(self, stopped: Callable[[], bool]) -> FloatArray | None:
+        """Go on until all is done, or ``stopped``, asked every few milliseconds, says so: None."""
+        parts = self._static.convex_parts
+        while self._done < len(parts):
+            if stopped():
+                return None
+            with self._lock:
+                some = parts[self._done : self._done + _PIECE]
+                for (reach, weight), made in zip(self._terms, self._made, strict=True):
+                    full = np.full(len(some), reach), np.full(len(some), weight)
+                    _add_weights(made, self._static.bounds, self._cell, some, *full)
+                self._done += len(some)
+        return self._whole
+
+    @functools.cached_property
+    def _whole(self) -> FloatArray:
+        return frozen(np.sum(self._made, axis=0))
 
 
-def _grid_weights(
+_wall_weights = functools.lru_cache(maxsize=16)(_WallWeights)
+
+
+def _no_weights(bounds: FloatArray, cell: float) -> FloatArray:
+    cols, rows = (int(np.ceil(side / cell)) for side in bounds[2:] - bounds[:2])
+    return np.zeros((rows, cols))
+
+
+def _add_weights(
+    weights: FloatArray,
     bounds: FloatArray,
     cell: float,
     shapes: Sequence[FloatArray],
     reach: FloatArray,
     weight: FloatArray,
-) -> FloatArray:
-    cols, rows = (int(np.ceil(side / cell)) for side in bounds[2:] - bounds[:2])
+) -> None:
+    """Add the weight of each shape to the cells within its reach [m]."""
     vertices, offsets = flatten(shapes)
     boxes = outline_boxes(vertices, offsets) + reach[:, None] * [-1.0, -1.0, 1.0, 1.0]
     within = ((boxes - np.tile(bounds[:2], 2)) / cell).astype(np.int64)
-    extra = np.zeros((rows, cols))
     x, y = bounds[:2]
-    core.fill_cell_weights(extra, x, y, cell, vertices, offsets, within, reach, weight)
-    return extra
+    core.add_cell_weights(weights, x, y, cell, vertices, offsets, within, reach, weight)
 
 
 def _cheapest(

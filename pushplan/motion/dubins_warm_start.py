@@ -6,7 +6,7 @@ tangents there, and from place to place on the shortest curve of bounded curvatu
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from pushplan.geometry import VisibilityGraph
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_improver import PathImprover
 from pushplan.motion.path_search_config import EDGE, INSET
-from pushplan.world import GoalDisc, NavigationGoal, World
+from pushplan.world import GoalDisc
 from pushplan.world.checks import FloatArray
 
 _FAR = 30.0
@@ -33,45 +33,52 @@ def is_far(improver: PathImprover) -> bool:
     return bool(away > _FAR * EDGE * improver.size)
 
 
-def warm_start(improver: PathImprover) -> None:
-    """Try to drive along the shortest homotopic path, objects or not; the improver keeps it."""
+def along_guide(improver: PathImprover, *, around: bool = False) -> bool:
+    """Try to drive along the shortest homotopic path; the improver keeps it.
+
+    Args:
+        improver: of this planning call.
+        around: True for a path around the objects, False for one that takes no notice of them.
+
+    Returns:
+        True if that is a path without a jam.
+    """
+    return any(is_way(improver, vias) for vias in guides(improver, around=around))
+
+
+def is_way(improver: PathImprover, vias: FloatArray) -> bool:
+    """Return True if curves through vias (V, 3) are a path without a jam; the improver keeps it."""
+    return improver.drives(curves_through(vias, improver.lead.pose, improver.turning_radius))
+
+
+def guides(improver: PathImprover, *, around: bool = False) -> Iterator[FloatArray]:
+    """Poses (V, 3) along the shortest homotopic path, wide of the walls and then near to them."""
     size = improver.size
+    goal = improver.goal
     depth = 1.01 * INSET * size
-    if isinstance(improver.goal, GoalDisc):
-        depth = improver.goal.radius - 0.99 * float(improver.room.goal[3])
+    if isinstance(goal, GoalDisc):
+        depth = goal.radius - 0.99 * float(improver.room.goal[3])
     radius = improver.turning_radius
     wide = max(_WIDE * size, _BEYOND_RADIUS * radius)
     for clearance in (wide, _NARROW * size):
         if improver.stopped():
             return  # the contours alone take their time on a large map
         world = improver.world.moved(robot_pose=improver.lead.pose)
-        arcs = warm_start_arcs(world, improver.goal, clearance, radius, depth, improver.stopped)
-        if arcs is None:
-            continue
-        if improver.candidate(arcs, improver.jam_cost, free=False) is not None:
-            return
+        if around:
+            world = world.believing(np.ones(len(world.movables), bool)).with_fixed_as_static()
+        graph = VisibilityGraph(keep_out(world), clearance)
+        corners = graph.to_goal(world.robot_pose[:2], goal, improver.stopped).points
+        if len(corners) >= 2:
+            yield _vias(corners, radius, depth)
 
 
-def warm_start_arcs(
-    world: World,  # gives the start and the walls
-    goal: NavigationGoal,
-    clearance: float,  # of the shortest path [m]
-    radius: float,  # least turning radius [m]
-    depth: float,  # depth in the goal at which the arcs end [m]
-    stopped: Callable[[], bool],  # ends the search of the path
-) -> FloatArray | None:
-    """Arcs along the shortest homotopic path; they may touch walls and objects.
+def curves_through(vias: FloatArray, start: FloatArray, radius: float) -> FloatArray:
+    """(3 V, 2) lengths [m] and curvatures [1/m] of the shortest curves through vias (V, 3).
 
-    Returns:
-        (E, 2) length [m] and curvature [1/m] of each arc, or None if there is no way.
+    They may touch walls and objects.
     """
-    start = world.robot_pose[:2]
-    corners = VisibilityGraph(keep_out(world), clearance).to_goal(start, goal, stopped).points
-    if len(corners) < 2:
-        return None
-    vias = _vias(corners, radius, depth)
     arcs = np.empty((3 * len(vias), 2))
-    here = world.robot_pose
+    here = start
     for i, there in enumerate(vias):
         core.dubins(here, there, radius, arcs[3 * i : 3 * i + 3])
         here = there

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
 
@@ -12,11 +12,13 @@ from pushplan.core import motion as core
 from pushplan.interaction import InteractionModel
 from pushplan.interaction.compiled_model import SweptModel, compile_interaction
 from pushplan.motion.collision import footprint, obstacles
+from pushplan.motion.goal_approach import behind, path_end, run_up, turns_at_end
 from pushplan.motion.goal_region import goal_numbers
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_search_config import (
     BATCH,
     INSET,
+    LEAST_GAIN,
     SHORTCUTS,
     SPACING,
     PathSearchConfig,
@@ -25,7 +27,7 @@ from pushplan.motion.room_ahead import Room
 from pushplan.motion.speed_profile import TIGHTEST, goal_is_outside, start_margin, timed_plan
 from pushplan.motion.swept_path import SweptPath, make_swept_path
 from pushplan.motion.time_slicing import Pace
-from pushplan.world import Drive, PlanResult, PlanStatus
+from pushplan.world import Drive, GoalDisc, GoalPose, PlanResult, PlanStatus
 from pushplan.world.checks import FloatArray
 from pushplan.world.planning_call import PlanningCall
 
@@ -34,6 +36,9 @@ _THIN_MARGIN = 0.05
 _LEAST_SPACING = 0.02  # least spacing for that reason [R]
 _LESS_MARGIN = 0.4  # of the margin is kept where plans fail with it
 _NO_MARGIN = 0.01  # a margin as small is given up then [R]
+_NEAR = 0.5
+"""Radius of the disc at a goal pose to which searches lead [tolerance of the place], or at the
+beginning of a straight way into it [R]."""
 _BEYOND = 1e4  # times the way around the workspace with everything in tow: no path is as long
 ENDLESS = 2**62
 """A limit of the tests of a sweep that is none."""
@@ -71,6 +76,17 @@ class PathImprover:
         turning_radius: float,  # least one of plans at first [m]
     ) -> None:
         world = call.world
+        self.given = world  # with its own goal
+        self.pose_goal = world.goal if isinstance(world.goal, GoalPose) else None
+        """A goal with a heading; searches of `world` lead to where the end of a path begins."""
+        self._straight = 0.0
+        if self.pose_goal is not None:
+            self._straight = run_up(world, self.pose_goal, turning_radius)
+            near = self.pose_goal.radius
+            if self._straight:
+                near = world.robot.circumscribed_radius
+            place = behind(self.pose_goal, self._straight)[:2]
+            world = replace(world, goal=GoalDisc(place, _NEAR * near))
         self.world = world
         self.config = config
         self.rng = call.rng
@@ -84,6 +100,7 @@ class PathImprover:
         self.best_cost = np.inf
         self.first_solution_s = float("nan")
         self.turning_radius = turning_radius
+        self.interaction = interaction
         self.contacts = compile_interaction(interaction, world)
         self._jam_length = self._endless_length()
         self.room = Room(
@@ -92,29 +109,39 @@ class PathImprover:
             goal_numbers(self.goal, INSET * self.size),
             SPACING * self.size,
         )
+        self._goal_of_paths = self.room.goal
+        if self.pose_goal is not None:
+            turns = turns_at_end(world.robot) and not self._straight
+            self._goal_of_paths = np.append(self.room.goal[:4], self.pose_goal.heading)
+            self._goal_of_paths[0] = 2.0 + turns
         # crowded worlds are slow to sweep: look at the stop rule more often
         self._batch = max(1, 10 * BATCH // (10 + len(world.movables)))
         self._call = call
         self._margin = 0.0
         self._shortcut_pace = Pace()
         self._sweep_pace = Pace()
-        self._best: SweptPath | None = None
+        self.best: SweptPath | None = None
 
     def begin(self) -> PlanStatus | None:
         """Find the margin that can be kept; a status where the call ends here already."""
         margin = start_margin(self.world, self.config.margin * self.size)
         if margin is None:
             return PlanStatus.START_BLOCKED
-        if goal_is_outside(self.world):
+        if goal_is_outside(self.given):
+            return PlanStatus.GOAL_UNREACHABLE
+        goal = self.pose_goal
+        if goal is not None and (margin := start_margin(self.world, margin, goal.pose)) is None:
             return PlanStatus.GOAL_UNREACHABLE
         self._set_margin(margin)
-        if self.goal.distance(*self.world.robot_pose[:2]) <= 0.0:
+        if self.given.goal_reached:
             here = make_swept_path(1, len(self.world.movables))
             here.poses[0] = self.world.robot_pose
             here.objects[0] = self.world.movables.poses
-            self._keep(here, 1, 0.0)
+            self.keep(here, 1, 0.0)
             return PlanStatus.SOLVED
-        return None
+        if goal is not None and goal.distance(*self.world.robot_pose[:2]) == 0.0:
+            self.candidate(np.empty((0, 2)), self.jam_cost)  # it only has to turn
+        return PlanStatus.SOLVED if self.solved else None
 
     def begin_with(self, lead: Lead | None) -> None:
         """Begin all paths with some arcs, from the next search on; None begins at the robot."""
@@ -168,7 +195,7 @@ class PathImprover:
             spacing=room.spacing,
             jam_length=self._jam_length,
             displacement=1.5 * self.size,
-            goal=room.goal,
+            goal=self._goal_of_paths,
             footprint=room.footprint,
             walls=room.walls,
         )
@@ -198,49 +225,141 @@ class PathImprover:
         self,
         arcs: FloatArray,  # (E, 2) length [m] and curvature [1/m], from the end of the lead on
         limit: float = np.inf,  # cost that it must stay below [kg m]
-        *,
-        free: bool = True,  # True if it is known to touch no wall and to reach the goal
     ) -> Candidate | None:
-        """The path along some arcs with its cost; None if it is not one that could be a plan."""
-        path, used = self.laid_out(np.concatenate([self.lead.pieces, arcs]))
-        if not free:
-            checker = core.CollisionChecker(self.room.footprint, self.room.walls)
-            blocked = checker.first_blocked(path.poses[:used]) < used
-            x, y = path.poses[used - 1, :2]
-            if blocked or self.goal.distance(float(x), float(y)) > 0.0:
-                return None
-        cost = self._cost_of(path, used, limit)
+        """The path along some arcs, free of walls, with its cost; None where it costs too much.
+
+        None too where the robot cannot take the heading of its goal there.
+        """
+        ended = self.ended(*self._along(arcs, 3))
+        if ended is None:
+            return None
+        path, used = ended
+        cost = self.sweep(path, used, limit)
         if cost is None:
             return None
-        self._keep(path, used, cost)
+        self.keep(path, used, cost)
         trial = make_swept_path(len(path.poses), len(self.world.movables))
         return Candidate(path, trial.view(), used, cost)
 
-    def laid_out(self, arcs: FloatArray) -> tuple[SweptPath, int]:
-        """The poses along arcs (E, 2) from the robot to the goal, not swept, and their number."""
+    def drives(self, arcs: FloatArray) -> bool:
+        """Keep the path along some arcs where it touches no wall, jams nothing and arrives."""
+        ended = self.ended(*self._along(arcs))
+        if ended is None:
+            return False
+        path, used = ended
+        goal = self.pose_goal or self.goal
+        if self.first_blocked(path, used) < used or not goal.reached_by(path.poses[used - 1]):
+            return False
+        cost = self.sweep(path, used, self.jam_cost)
+        if cost is None:
+            return False
+        self.keep(path, used, cost)
+        return True
+
+    def _along(self, arcs: FloatArray, spare: int = 1) -> tuple[SweptPath, int]:
+        return self.laid_out(np.concatenate([self.lead.pieces, arcs]), spare=spare)
+
+    def first_blocked(self, path: SweptPath, count: int, known: int = 0) -> int:
+        """The first of ``count`` poses where the robot touches a wall, none of those known does."""
+        checker = core.CollisionChecker(self.room.footprint, self.room.walls)
+        return known + checker.first_blocked(path.poses[known:count])
+
+    def ended(self, path: SweptPath, count: int) -> tuple[SweptPath, int] | None:
+        """A path of ``count`` poses whose end has the heading of the goal, if that asks for one.
+
+        Returns:
+            The path, not swept where its end is another one, and the number of its poses; None
+            where there is no such end.
+        """
+        if self.pose_goal is None:
+            return path, count
+        end = path_end(
+            self.world.robot,
+            self.pose_goal,
+            path.poses[:count],
+            self.turning_radius,
+            self.room.spacing,
+            core.CollisionChecker(self.room.footprint, self.room.walls),
+            self._straight,
+        )
+        if end is None:
+            return None
+        used = end.kept + len(end.poses)
+        other = make_swept_path(3 * used + 200, len(self.world.movables))
+        other.poses[:used] = np.concatenate([path.poses[: end.kept], end.poses])
+        other.curvatures[:used] = np.concatenate([path.curvatures[: end.kept], end.curvatures])
+        other.objects[0] = path.objects[0]
+        return other, used
+
+    def laid_out(
+        self, arcs: FloatArray, start: FloatArray | None = None, *, spare: int = 1
+    ) -> tuple[SweptPath, int]:
+        """Lay poses along arcs (E, 2) from the robot, or from a pose, to the goal.
+
+        Args:
+            arcs: lengths [m] and curvatures [1/m].
+            start: (3,) where they begin; at the robot if None.
+            spare: times as many poses as there is room for.
+
+        Returns:
+            A path that is not swept, and the number of its poses.
+        """
         steps = [abs(arc) / core.step_along(turn, self.room.spacing) for arc, turn in arcs.tolist()]
-        capacity = 3 * int(sum(steps) + len(arcs)) + 200
+        capacity = spare * int(sum(steps) + len(arcs)) + 200
         path = make_swept_path(capacity, len(self.world.movables))
-        used = core.lay_out(self.world.robot_pose, arcs, path.view(), self.problem)
-        assert used > 0  # there is room for three times as many poses
+        begin = self.world.robot_pose if start is None else start
+        used = core.lay_out(begin, arcs, path.view(), self.problem)
+        assert used > 0  # there is room for all
         path.objects[0] = self.world.movables.poses
         return path, used
 
-    def _cost_of(self, path: SweptPath, count: int, limit: float) -> float | None:
-        """Sweep the objects along a path; its cost [kg m], None where it passes the limit.
+    def sweep(
+        self, path: SweptPath, count: int, limit: float = np.inf, known: int = 1
+    ) -> float | None:
+        """Sweep the objects along a path.
 
-        Sweeping through a crowd takes its time: None too where the stop rule fires meanwhile.
+        Sweeping through a crowd takes its time: there is no cost where the stop rule fires
+        meanwhile.
+
+        Args:
+            path: of which ``count`` poses are in use.
+            count: likewise.
+            limit: cost that it must stay below [kg m].
+            known: poses up to which the objects are known.
+
+        Returns:
+            Its cost [kg m]; None where it passes the limit.
         """
         cost = 0.0
-        swept = 1
+        swept = known
         view = path.view()
         problem = self.problem
-        for first, last in self._sweep_pace.pieces(count - 1, self.stopped):
-            swept = last + 1
-            cost = core.sweep_cost(view, first, swept, limit, ENDLESS, problem, self.contacts)
+        for first, last in self._sweep_pace.pieces(count - known, self.stopped):
+            swept = known + last
+            cost = core.sweep_cost(
+                view, known + first - 1, swept, limit, ENDLESS, problem, self.contacts
+            )
             if not cost < limit:
                 return None
         return cost if swept == count else None
+
+    def work_out(self, candidate: Candidate) -> None:
+        """Shortcut a path for as long as that pays and the stop rule allows."""
+        while not self.stopped():
+            before = candidate.cost
+            self.shortcut(candidate)
+            if candidate.cost > (1.0 - LEAST_GAIN) * before:
+                return
+
+    def work_out_best(self) -> None:
+        """Shortcut the best path."""
+        if self.best is None:
+            return
+        count = len(self.best.poses)
+        path, trial = (make_swept_path(3 * count + 200, len(self.world.movables)) for _ in "ab")
+        for ours, best in zip(path, self.best, strict=True):
+            ours[:count] = best
+        self.work_out(Candidate(path, trial.view(), count, self.best_cost))
 
     def shortcut(self, candidate: Candidate) -> None:
         """Try `SHORTCUTS` shortcuts, as long as the stop rule allows."""
@@ -264,24 +383,25 @@ class PathImprover:
                     problem,
                     self.contacts,
                 )
-                self._keep(candidate.path, candidate.count, candidate.cost)
+            self.keep(candidate.path, candidate.count, candidate.cost)
             self.iterations += self._batch
 
-    def _keep(self, path: SweptPath, count: int, cost: float) -> None:
+    def keep(self, path: SweptPath, count: int, cost: float) -> None:
+        """Keep a copy of the first ``count`` poses of a swept path if it is the best so far."""
         if cost >= self.best_cost:
             return
         if np.isnan(self.first_solution_s) and cost < self.jam_cost:
             self.first_solution_s = self._call.elapsed
         self.best_cost = cost
         self.tight = self.relaxed > 1
-        self._best = SweptPath(*(part[:count].copy() for part in path))
+        self.best = SweptPath(*(part[:count].copy() for part in path))
 
     def result(self, status: PlanStatus, **detail: float) -> PlanResult:
         """The result of the call: the best path so far as a plan, where the status has one."""
         plan = None
         if status.has_plan:
-            assert self._best is not None
-            plan = timed_plan(self.world, self._best, self.config.turn_fraction)
+            assert self.best is not None
+            plan = timed_plan(self.world, self.best, self.config.turn_fraction)
         return self._call.result(
             status,
             plan,

@@ -10,7 +10,10 @@ import numpy as np
 from pushplan.core import motion as core
 from pushplan.geometry.angles import wrap_angle
 from pushplan.motion.collision import footprint, obstacles
-from pushplan.world import Plan, PlanResult, PlanStatus, World
+from pushplan.motion.goal_approach import path_end, run_up
+from pushplan.motion.keep_out import keep_out
+from pushplan.motion.speed_profile import along_arcs, turning_radius
+from pushplan.world import GoalPose, Plan, PlanResult, PlanStatus, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.planning_call import PlanningCall
 
@@ -65,7 +68,7 @@ def polyline_status(world: World, plan: Plan) -> PlanStatus:
     lasts = np.diff(plan.times)
     fast = turns > robot.max_turn_rate * lasts + 1e-9
     lengths = np.hypot(moves[:, 0], moves[:, 1])
-    fast |= turns * robot.min_turning_radius > lengths + 1e-9
+    fast |= turns * robot.min_turning_radius > plan.speeds[:-1] * lasts + 1e-9
     fast |= (turns > 1e-9) & math.isfinite(robot.max_turn_acceleration)  # all at once, at a corner
     near = 1e-9 * robot.circumscribed_radius
     if np.abs(off[:2]).max() > near or abs(math.remainder(off[2], math.tau)) > 1e-9 or fast.any():
@@ -89,7 +92,50 @@ def polyline_result(
     spacing: float,  # distance between the poses of its plan [R]
     iterations: int,
 ) -> PlanResult:
-    """The result of a planner whose paths are polylines."""
+    """The result of a planner whose paths are polylines.
+
+    The status is `APPROXIMATE` where the plan leads to the goal, but cannot end at its heading.
+    """
     world = call.world
-    plan = polyline_plan(world, points, spacing * world.robot.circumscribed_radius)
+    spacing = spacing * world.robot.circumscribed_radius
+    plan = polyline_plan(world, points, spacing)
+    goal = world.navigation_goal
+    if isinstance(goal, GoalPose) and not goal.reached_by(plan.poses[-1]):
+        ended = _ended_at(world, goal, plan, spacing)
+        if ended is None:
+            return call.result(PlanStatus.APPROXIMATE, plan, iterations=iterations)
+        plan = ended
     return call.result(polyline_status(world, plan), plan, call.elapsed, iterations)
+
+
+def _ended_at(world: World, goal: GoalPose, plan: Plan, spacing: float) -> Plan | None:
+    """A plan with an end at the goal's heading, driven at full speed; None if there is none."""
+    robot = world.robot
+    checker = core.CollisionChecker(footprint(robot), obstacles(keep_out(world)))
+    radius = turning_radius(robot, 1.0)
+    end = path_end(robot, goal, plan.poses, radius, spacing, checker)
+    if end is None:
+        straight = run_up(world, goal, radius)
+        end = path_end(robot, goal, plan.poses, radius, spacing, checker, straight)
+    if end is None:
+        return None
+    poses = np.concatenate([plan.poses[: end.kept], end.poses])
+    moves = np.diff(poses[end.kept - 1 :], axis=0)
+    on_spot = np.isinf(end.curvatures)
+    curvatures = np.where(on_spot, 0.0, end.curvatures)
+    lengths = along_arcs(np.hypot(moves[:, 0], moves[:, 1]), curvatures)
+    most = robot.max_turn_rate
+    speeds = np.full(len(moves), robot.max_speed)
+    if robot.can_stop:
+        speeds = np.minimum(speeds, most / np.maximum(np.abs(curvatures), 1e-12))
+    lasts = np.where(on_spot, np.abs(moves[:, 2]) / most, lengths / speeds)
+    speeds[on_spot] = 0.0
+    rates = np.where(on_spot, np.copysign(most, end.curvatures), speeds * curvatures)
+    before = end.kept - 1
+    return Plan(
+        times=np.concatenate([plan.times[: end.kept], plan.times[before] + np.cumsum(lasts)]),
+        poses=poses,
+        speeds=np.concatenate([plan.speeds[:before], speeds, speeds[-1:]]),
+        turn_rates=np.concatenate([plan.turn_rates[:before], rates, rates[-1:]]),
+        travel_cost=robot.mass * float(plan.arc_lengths[before] + lengths.sum()),
+    )

@@ -48,15 +48,17 @@ def check_turns(robot: RobotModel) -> None:
         )
 
 
-def start_margin(world: World, margin: float) -> float | None:
+def start_margin(world: World, margin: float, pose: FloatArray | None = None) -> float | None:
     """The clearance [m] that can be kept from the start on, or None if the robot overlaps.
 
-    A robot that starts nearer to a wall than ``margin`` keeps what it has.
+    A robot that starts nearer to a wall than ``margin`` keeps what it has. Of another pose (3,)
+    it is what can be kept up to there.
     """
+    pose = world.robot_pose if pose is None else pose
     walls = obstacles(keep_out(world))
     for fraction in _FRACTIONS:
         shape = footprint(world.robot, fraction * margin)
-        if core.CollisionChecker(shape, walls).is_free(world.robot_pose):
+        if core.CollisionChecker(shape, walls).is_free(pose):
             return fraction * margin
     return None
 

@@ -13,6 +13,7 @@ from pushplan.world import (
     ClearanceArea,
     GoalDisc,
     GoalLine,
+    GoalPose,
     InvalidInputError,
     Receptacle,
     RobotModel,
@@ -61,9 +62,12 @@ class NoiseAllowance:
         inset = _SURE * self.place
         if isinstance(goal, GoalDisc):
             inset += world.robot.max_speed * self.period  # the last command acts
-            world = replace(
-                world, goal=GoalDisc(goal.center, max(goal.radius - inset, 0.5 * goal.radius))
-            )
+            goal = replace(goal, radius=max(goal.radius - inset, 0.5 * goal.radius))
+            if isinstance(goal, GoalPose):
+                turn = _SURE * self.heading + world.robot.max_turn_rate * self.period
+                most = goal.heading_tolerance
+                goal = replace(goal, heading_tolerance=max(most - turn, 0.5 * most))
+            world = replace(world, goal=goal)
         elif isinstance(goal, GoalLine):
             if inset > 0.0:
                 world = replace(world, goal=replace(goal, point=goal.point + inset * goal.normal))

@@ -41,7 +41,7 @@ from pushplan.world import (
     Twist,
     World,
 )
-from pushplan.world.checks import choice, expect, number
+from pushplan.world.checks import FloatArray, choice, expect, number
 from pushplan.world.policy_abilities import shown_plan
 
 PLAN_STOP = OwnBudget() | Deadline(1.0)
@@ -75,8 +75,8 @@ class Runner:
         position_noise: standard deviation of the places in the worlds, of robot and objects [m].
         heading_noise: the same of the headings [rad].
         observer_gain: how much of the difference between what is predicted and what is seen is
-            believed; less than 1 smooths noisy poses. By default 1, and 0.3 where there is noise.
-            A policy that `ExpectsNoise` is told what is left.
+            believed at most; less than 1 smooths noisy poses. By default 1, and 0.3 where there is
+            noise. A policy that `ExpectsNoise` is told what is left.
         margin: distance that plans keep from what is static [m]; if None that of the worlds, and
             twice what noise leaves at the robot's farthest point, whichever is more.
         keep_unseen: for how long an object is taken to be there that is missing in the worlds [s].
@@ -134,27 +134,30 @@ class Runner:
         self.margin = margin
         self.keep_unseen = number("keep_unseen", keep_unseen, low=0.0)
         delay = number("delay", delay, low=0.0)
-        noise = [
-            number("position_noise", position_noise, low=0.0),
-            number("heading_noise", heading_noise, low=0.0),
-        ]
+        place = number("position_noise", position_noise, low=0.0)
+        noise = np.array([place, place, number("heading_noise", heading_noise, low=0.0)])
         if observer_gain is None:
-            observer_gain = _SMOOTHING if any(noise) else 1.0
+            observer_gain = _SMOOTHING if noise.any() else 1.0
         gain = number("observer_gain", observer_gain, low=0.0, high=1.0, open_low=True)
         self.policy = drivable(policy, self.max_age, contact)
-        left = math.sqrt(gain / (2.0 - gain))  # of white noise, after a filter of that gain
-        self._allowance = NoiseAllowance(left * noise[0], left * noise[1], self.period, self.margin)
-        self._guard = ObstacleGuard(self._allowance, self.period)
-        if any(noise) and isinstance(self.policy, ExpectsNoise):
-            self.policy.expect_noise(left * noise[0], left * noise[1])
         self._believed = max(self.max_age, _BLIND if self.on_stale == "continue" else 0.0)
-        self._estimator = StateEstimator(delay, gain, self._believed)
+        self._estimator = StateEstimator(delay, gain, noise, self._believed)
         self._delay = delay
         self._log = log
         self._executor = executor or ThreadExecutor(self.plan_stop, clock)
         self._lock = threading.Lock()  # of the snapshots that have come in, and their counts
         self._prompt = False
+        self._allow_for(np.zeros(3))
         self._forget()
+
+    def _allow_for(self, noise: FloatArray) -> None:
+        """Have policy, goals and margins allow for the noise (3,) that the estimates keep."""
+        self._noise = noise
+        place, _, heading = noise.tolist()
+        self._allowance = NoiseAllowance(place, heading, self.period, self.margin)
+        self._guard = ObstacleGuard(self._allowance, self.period)
+        if self._allowance.is_noisy and isinstance(self.policy, ExpectsNoise):
+            self.policy.expect_noise(place, heading)
 
     def _forget(self) -> None:
         self.status: CommandStatus | None = None
@@ -193,6 +196,7 @@ class Runner:
         Raises:
             InvalidInputError: if the policy cannot be used in such a world.
         """
+        self._allow_for(self._estimator.remaining_noise(world.robot, self.period))
         world = self._allowance.planning_world(world)
         with self._lock:
             self._forget()
@@ -218,12 +222,14 @@ class Runner:
     def _observe(self, world: World) -> None:
         """Take a snapshot, and see whether it is sure by now that the goal is reached."""
         seen = self._estimator.observe(world)
-        if seen.goal_reached:
+        of_robot = isinstance(world.goal, GoalDisc | GoalLine)
+        exact = of_robot and not self._allowance.is_noisy
+        once = exact or not world.robot.can_stop  # one that drives on may be out soon
+        ready = once or self._estimator.is_settled(self._noise, robot_only=of_robot)
+        if seen.goal_reached and ready:
             self._done += 1
         else:
             self._done = max(0, self._done - 1)
-        exact = isinstance(world.goal, GoalDisc | GoalLine) and not self._allowance.is_noisy
-        once = exact or not world.robot.can_stop  # one that drives on may be out soon
         self._surely_done = self._surely_done or self._done >= (1 if once else _SURE)
 
     def _drop_plans(self) -> None:

@@ -1,6 +1,6 @@
-"""Fully specified starts, named lists of them, and fields of broken ice.
+"""Fully specified starts, named lists of them, fields of broken ice, and offices.
 
-What makes ice only comes on first use.
+What makes ice and offices only comes on first use.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from pushplan.scenarios.ice_field import IceField
     from pushplan.scenarios.ice_files import load_ice, save_ice
     from pushplan.scenarios.ice_generator import generate_ice
+    from pushplan.scenarios.office import generate_office
 
 __all__ = [
     "FloeSizes",
@@ -23,6 +24,7 @@ __all__ = [
     "Scenario",
     "Suite",
     "generate_ice",
+    "generate_office",
     "load_ice",
     "load_scenarios",
     "save_ice",
@@ -39,5 +41,6 @@ __getattr__, __dir__ = lazy_names(
         "ice_field": "IceField",
         "ice_files": "load_ice save_ice",
         "ice_generator": "generate_ice",
+        "office": "generate_office",
     },
 )

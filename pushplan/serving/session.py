@@ -25,7 +25,7 @@ from pushplan.world.stored.world_files import SCHEMA
 LOG = logging.getLogger("pushplan.serving")
 QUICK_BYTES = 20_000
 """Longest message that is answered without a thread; reading a longer one takes time."""
-_GOALS = {"robot": ("disc", "line"), "objects": ("receptacle", "clearance_area")}
+_GOALS = {"robot": ("disc", "pose", "line"), "objects": ("receptacle", "clearance_area")}
 Fields = dict[str, Any]
 _Kind = TypeVar("_Kind", StepEpisode, LoopEpisode)
 

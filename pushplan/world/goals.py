@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Annotated
@@ -9,7 +10,7 @@ from typing import Annotated
 import numpy as np
 
 from pushplan.errors import InvalidInputError
-from pushplan.world.checked_fields import CheckedFields, PositiveFloat, Shape
+from pushplan.world.checked_fields import CheckedFields, Limits, PositiveFloat, Shape
 from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, IntArray, array, frozen
 from pushplan.world.outline import convex_outline, next_corner, signed_area
 
@@ -40,6 +41,39 @@ class GoalDisc(ArrayRecord, CheckedFields):
         offset = points - self.center
         inside: BoolArray = np.hypot(offset[..., 0], offset[..., 1]) <= self.radius
         return inside
+
+    def reached_by(self, pose: FloatArray) -> bool:
+        """True if a robot at a pose (3,) x, y [m], theta [rad] is at the goal."""
+        return self.distance(float(pose[0]), float(pose[1])) == 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class GoalPose(GoalDisc):
+    """A disc in which the robot has to face a heading.
+
+    Args:
+        center: (2,) x, y [m], world frame.
+        radius: tolerance of the position [m], positive.
+        heading: direction of the robot's x axis [rad], world frame.
+        heading_tolerance: to either side [rad], positive, at most π.
+    """
+
+    heading: float
+    heading_tolerance: Annotated[float, Limits(0.0, math.pi, open_low=True)]
+
+    @property
+    def pose(self) -> FloatArray:
+        """(3,) x, y [m], theta [rad] in the middle of the tolerances."""
+        return np.append(self.center, self.heading)
+
+    def heading_error(self, heading: float) -> float:
+        """Turn [rad] from a heading to that of the goal, positive to the left, at most π."""
+        return math.remainder(self.heading - heading, math.tau)
+
+    def reached_by(self, pose: FloatArray) -> bool:
+        """True if a robot at a pose (3,) x, y [m], theta [rad] is within both tolerances."""
+        turned = abs(self.heading_error(float(pose[2]))) <= self.heading_tolerance
+        return turned and super().reached_by(pose)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +107,10 @@ class GoalLine(ArrayRecord, CheckedFields):
         """Check which of the (..., 2) points [m] are on the line or beyond."""
         beyond: BoolArray = (points - self.point) @ self.normal >= 0.0
         return beyond
+
+    def reached_by(self, pose: FloatArray) -> bool:
+        """True if a robot at a pose (3,) x, y [m], theta [rad] is on the line or beyond."""
+        return self.distance(float(pose[0]), float(pose[1])) == 0.0
 
 
 class _ObjectGoal(ArrayRecord, ABC):

@@ -14,8 +14,7 @@ from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, Shape
 from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray
 from pushplan.world.goals import (
     Goal,
-    GoalDisc,
-    GoalLine,
+    GoalPose,
     ManipulationGoal,
     NavigationGoal,
 )
@@ -65,7 +64,7 @@ class World(ArrayRecord, CheckedFields):
         super().__post_init__()
         if not isinstance(self.goal, Goal):
             raise InvalidInputError(
-                "world.goal must be a GoalDisc, GoalLine, Receptacle or ClearanceArea, "
+                "world.goal must be a GoalDisc, GoalPose, GoalLine, Receptacle or ClearanceArea, "
                 f"got {type(self.goal).__name__}"
             )
 
@@ -85,10 +84,24 @@ class World(ArrayRecord, CheckedFields):
         """
         if not isinstance(self.goal, NavigationGoal):
             raise InvalidInputError(
-                "this needs a goal for the robot (GoalDisc or GoalLine), "
+                "this needs a goal for the robot (GoalDisc, GoalPose or GoalLine), "
                 f"got {type(self.goal).__name__}"
             )
         return self.goal
+
+    @property
+    def place_goal(self) -> NavigationGoal:
+        """The goal, where it is one for the robot itself that says nothing of its heading.
+
+        Raises:
+            InvalidInputError: if it is another one.
+        """
+        if isinstance(self.goal, GoalPose):
+            raise InvalidInputError(
+                "this goes to a GoalDisc or GoalLine at any heading, got a GoalPose; plan with "
+                "straight, kinodynamic-rrt or push-aware"
+            )
+        return self.navigation_goal
 
     @property
     def manipulation_goal(self) -> ManipulationGoal:
@@ -128,9 +141,8 @@ class World(ArrayRecord, CheckedFields):
     @property
     def goal_reached(self) -> bool:
         """True if the robot, or every object, is where the goal wants it."""
-        if isinstance(self.goal, GoalDisc | GoalLine):
-            x, y, _ = self.robot_pose.tolist()
-            return self.goal.distance(x, y) == 0.0
+        if isinstance(self.goal, NavigationGoal):
+            return self.goal.reached_by(self.robot_pose)
         return bool(self.completed.all())
 
     def robot_outline_world(self) -> tuple[FloatArray, ...]:

@@ -226,7 +226,11 @@ def test_a_world_file_is_no_suite(capsys: pytest.CaptureFixture[str]) -> None:
     ("old", "new", "said"),
     [
         ("pose: [1.0, 1.0,", "pose: [.nan, 1.0,", "robot.pose must be finite, got nan"),
-        ("kind: disc", "kind: circle", "'circle' (valid: clearance_area, disc, line, receptacle)"),
+        (
+            "kind: disc",
+            "kind: circle",
+            "'circle' (valid: clearance_area, disc, line, pose, receptacle)",
+        ),
         ("mass: 1.07", "mass: .inf", "robot.mass must lie in (0, inf), got inf"),
         ("mass: 1.07", "mass: -1.07", "robot.mass must lie in (0, inf), got -1.07"),
         ("mass: 0.5 ", "mass: .nan ", "movables[0].mass must lie in (0, inf), got nan"),

@@ -17,6 +17,7 @@ from pushplan.world import (
     Goal,
     GoalDisc,
     GoalLine,
+    GoalPose,
     InvalidInputError,
     Movables,
     Plan,
@@ -120,6 +121,7 @@ def test_text_stays_in_its_corner() -> None:
     "goal",
     [
         GoalLine(np.array([0.0, 8.0]), np.array([0.1, 1.0])),
+        GoalPose(np.array([2.0, 8.4]), 0.02, np.pi / 2.0, 0.1),
         Receptacle(np.array([[1.0, 7], [3, 7], [3, 9], [1, 9]])),
         ClearanceArea(np.array([[1.0, 7], [3, 7], [3, 9], [1, 9]]), np.ones(4, dtype=bool)),
     ],

@@ -103,7 +103,8 @@ def test_what_a_policy_is_told_is_no_part_of_a_bound():
     assert known == wrong
 
 
-WITHOUT = ("box-delivery-2d-large-columns-20", "smoke")
+OFFICES = ("office-1k", "office-2k", "office-5k")
+WITHOUT = ("box-delivery-2d-large-columns-20", *OFFICES, "smoke")
 """The suites of which some scenarios have no best known solution, and the one of several tasks."""
 
 

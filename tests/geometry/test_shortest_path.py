@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable, Iterator
 
 import networkx as nx
 import numpy as np
@@ -15,6 +16,7 @@ from pushplan.geometry import (
     Grid,
     VisibilityGraph,
     clearance_field,
+    contours,
     geodesic_field,
     goal_distances,
     visibility_graph,
@@ -32,12 +34,34 @@ U_MAZE = StaticMap.build([], U_WALLS, 0.5, bounds=[0, 0, 15, 15])
 GOAL = GoalDisc(np.array([3.75, 3.75]), 1.86)
 
 
+def forget_maps() -> None:
+    """What is kept of maps depends on which of them count as large."""
+    for kept in (contours._maker_of, visibility_graph._boxes_of, visibility_graph._covered_sides):
+        kept.cache_clear()
+
+
+@pytest.fixture
+def many_corners(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[int], None]]:
+    """Sets the corners from which on a map is large."""
+
+    def set_to(corners: int) -> None:
+        monkeypatch.setattr(contours, "MANY_CORNERS", corners)
+        forget_maps()
+
+    yield set_to
+    forget_maps()
+
+
 @pytest.fixture(params=[False, True], ids=["small", "large"])
-def either_size(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+def either_size(
+    request: pytest.FixtureRequest,
+    monkeypatch: pytest.MonkeyPatch,
+    many_corners: Callable[[int], None],
+) -> None:
     """Searches as on small maps, and with the estimates that large maps need."""
     if request.param:
-        monkeypatch.setattr("pushplan.geometry.visibility_graph.MANY_CORNERS", 0)
-        monkeypatch.setattr("pushplan.geometry.visibility_graph._PLAIN_BUDGETS", 0)
+        many_corners(0)
+        monkeypatch.setattr(visibility_graph, "_PLAIN_BUDGETS", 0)
 
 
 def free_space(static: StaticMap, clearance: float) -> shapely.Geometry:
@@ -376,7 +400,7 @@ def test_the_lazy_search_finds_what_the_complete_graph_holds(seed: int) -> None:
         for start in rng.uniform(0, 10, (8, 2)):
             path = VisibilityGraph(static, clearance).to_goal(start, goal)
             expected = complete.path_from(start)
-            longest = 1.05 if visibility_graph.MANY_CORNERS == 0 else 1.0 + 3e-7
+            longest = 1.05 if contours.MANY_CORNERS == 0 else 1.0 + 3e-7
             assert (1.0 - 3e-7) * expected.length <= path.length <= longest * expected.length
             if math.isfinite(path.length):
                 assert np.hypot(*np.diff(path.points, axis=0).T).sum() == pytest.approx(path.length)
@@ -401,7 +425,9 @@ def test_a_search_among_ten_thousand_walls_can_be_stopped() -> None:
     assert np.median(np.diff(looks)) < 0.1  # a whole graph takes minutes
 
 
-def test_the_way_out_of_a_crowded_dead_end_is_found_soon(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_way_out_of_a_crowded_dead_end_is_found_soon(
+    many_corners: Callable[[int], None],
+) -> None:
     square = np.array([[0.0, 0.0], [0.5, 0.0], [0.5, 0.5], [0.0, 0.5]])
     wall = [square + np.array([10.0, 0.5 * i]) for i in range(40)]  # but the goal is behind it
     posts = [0.5 * square + 1.2 * np.array([i, j]) for i in range(1, 8) for j in range(2, 16)]
@@ -414,8 +440,8 @@ def test_the_way_out_of_a_crowded_dead_end_is_found_soon(monkeypatch: pytest.Mon
         return False
 
     found = []
-    for corners in (1_000_000, 1000):
-        monkeypatch.setattr("pushplan.geometry.visibility_graph.MANY_CORNERS", corners)
+    for corners in (1_000_000, 100):
+        many_corners(corners)
         looks.clear()
         path = VisibilityGraph(static, 0.2).to_goal((9.2, 18.0), goal, stopped)
         found.append((path.length, len(looks)))
@@ -438,9 +464,11 @@ def test_goals_on_corners_and_edges_of_the_map_are_reached(bounds: list[float]) 
         assert path.length == pytest.approx(math.dist(start, goal), rel=0.05)
 
 
-def test_that_no_way_leads_to_the_goal_is_found_soon(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pushplan.geometry.visibility_graph.MANY_CORNERS", 0)
-    monkeypatch.setattr("pushplan.geometry.visibility_graph._PLAIN_BUDGETS", 0)
+def test_that_no_way_leads_to_the_goal_is_found_soon(
+    monkeypatch: pytest.MonkeyPatch, many_corners: Callable[[int], None]
+) -> None:
+    many_corners(0)
+    monkeypatch.setattr(visibility_graph, "_PLAIN_BUDGETS", 0)
     square = np.array([[0.0, 0.0], [0.1, 0.0], [0.1, 0.1], [0.0, 0.1]])
     wall = [square + np.array([7.0, 0.1 * i]) for i in range(100)]
     posts = [square + np.array([0.9 * i, 0.9 * j]) for i in range(1, 7) for j in range(1, 11)]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pushplan.gtsp import TourStatus, solve_gtsp
-from pushplan.world import InvalidInputError
+from pushplan.world import Deadline, InvalidInputError
 
 
 def graph_of(costs: np.ndarray, clusters: list[list[str]], names: list[str]) -> nx.DiGraph:
@@ -28,6 +28,16 @@ def test_a_graph_is_solved_as_its_matrix_is() -> None:
     found = solve_gtsp(graph_of(costs, [["a"], list("bcde"), list("fghi")], names))
     assert found.nodes == tuple(names[node] for node in tour.nodes)
     assert found.cost == tour.cost == tour.lower_bound and found.status is TourStatus.OPTIMAL
+
+
+def test_tours_of_a_graph_are_given_by_its_names() -> None:
+    costs = np.random.default_rng(0).random((9, 9))
+    graph = graph_of(costs, [["a"], list("bcde"), list("fghi")], list("abcdefghi"))
+    found = solve_gtsp(graph, initial="b i a".split(), fixed_start=["b", "i"], stop=Deadline(0.0))
+    assert found.nodes == ("b", "i", "a")
+    assert solve_gtsp(graph, initial=found).cost <= found.cost
+    with pytest.raises(InvalidInputError, match="initial has node 'z', but nodes are those of the"):
+        solve_gtsp(graph, initial=["a", "b", "z"])
 
 
 def test_an_edge_that_is_missing_is_forbidden_and_an_undirected_one_leads_both_ways() -> None:

@@ -11,6 +11,8 @@ import time
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from benchmarks.accuracy.gtsp_instances import FAMILIES, instance
 from pushplan.gtsp import (
@@ -25,6 +27,7 @@ from pushplan.world import Cancellation, Deadline, InvalidInputError, MaxIterati
 
 SEARCH = GtspConfig(method="search")
 PROOF = GtspConfig(method="search", lower_bound=True)
+CONFIGS = {"exact": GtspConfig(method="exact"), "search": SEARCH, "proof": PROOF}
 
 
 @pytest.mark.parametrize("method", ["auto", "search"])
@@ -461,3 +464,106 @@ def test_runs_begin_at_random_as_long_as_there_is_time_for_one(monkeypatch, each
     costs, clusters = instance("uniform", 1000)
     solve_gtsp(costs, clusters, stop=MaxIterations(100), config=SEARCH)
     assert made == again
+
+
+def random_tour(rng: np.random.Generator, clusters: list[list[int]]) -> tuple[int, ...]:
+    """Some node of each cluster, clusters in some order."""
+    return tuple(int(rng.choice(clusters[c])) for c in rng.permutation(len(clusters)))
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    method=st.sampled_from(["auto", "search", "large", "proof"]),
+    fixed=st.integers(0, 3),
+    spent=st.booleans(),
+)
+@settings(max_examples=200, deadline=None)
+def test_a_tour_is_never_worse_than_the_one_it_began_with(
+    seed: int, method: str, fixed: int, spent: bool
+) -> None:
+    rng = np.random.default_rng(seed)
+    costs, clusters = random_instance(rng, most=7)
+    given_tour = random_tour(rng, clusters)
+    arcs = list(itertools.pairwise((*given_tour, given_tour[0])))
+    for arc in arcs:
+        costs[arc] = rng.random() if np.isinf(costs[arc]) else costs[arc]
+    config = GtspConfig(
+        method="auto" if method == "auto" else "search",
+        search_nodes=len(clusters) if method == "large" else 3000,
+        lower_bound=method == "proof",
+    )
+    start = given_tour[: min(fixed, len(given_tour))]
+    tour = solve_gtsp(
+        costs,
+        clusters,
+        stop=MaxIterations(0 if spent else 30),
+        config=config,
+        initial=given_tour,
+        fixed_start=start,
+    )
+    cost = math.fsum(costs[arc] for arc in arcs) if len(clusters) > 1 else 0.0
+    assert tour.cost <= cost
+    assert tour.nodes[: len(start)] == start
+    if spent and len(clusters) > max(1, len(start)):
+        at = tour.nodes.index(given_tour[0])
+        assert tour.nodes[at:] + tour.nodes[:at] == given_tour
+        assert tour.cost == cost
+    if not start:
+        check_tour(tour, costs, clusters)
+
+
+@given(seed=st.integers(0, 2**32 - 1), method=st.sampled_from(["exact", "search", "proof"]))
+@settings(max_examples=100, deadline=None)
+def test_a_fixed_start_gives_the_cheapest_tour_that_begins_so(seed: int, method: str) -> None:
+    rng = np.random.default_rng(seed)
+    costs, clusters = random_instance(rng)
+    start = random_tour(rng, clusters)[: int(rng.integers(1, 4))]
+    rest = [nodes for nodes in clusters if not set(nodes) & set(start)]
+    best = math.inf
+    for order in itertools.permutations(rest):
+        for nodes in itertools.product(*order):
+            tour = [*start, *nodes]
+            if len(tour) > 1:
+                arcs = itertools.pairwise((*tour, tour[0]))
+                best = min(best, math.fsum(costs[arc] for arc in arcs))
+            else:
+                best = 0.0
+    found = solve_gtsp(costs, clusters, config=CONFIGS[method], fixed_start=start)
+    assert found.cost >= best or close(found.cost, best, costs)
+    assert found.lower_bound <= best or close(found.lower_bound, best, costs)
+    if method == "exact":
+        assert close(found.cost, best, costs)
+    assert not found.nodes or found.nodes[: len(start)] == start
+
+
+def test_a_warm_start_keeps_what_a_longer_search_has_found() -> None:
+    costs, clusters = instance("uniform", 1003)
+    before = solve_gtsp(costs, clusters, stop=MaxIterations(4000))
+    cold = solve_gtsp(costs, clusters, stop=MaxIterations(50))
+    warm = solve_gtsp(costs, clusters, stop=MaxIterations(50), initial=before)
+    assert warm.cost <= before.cost < cold.cost
+    assert warm.stats.iterations <= 50
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"initial": 3}, "initial must be a sequence of nodes, got 3"),
+        ({"initial": "abc"}, "initial must be a sequence of nodes"),
+        ({"initial": [0, 1]}, "initial does not visit cluster 2"),
+        ({"initial": [0, 1, 2, 3]}, "initial visits cluster 1 more than once"),
+        ({"initial": [0, 1, 1]}, "initial has node 1 twice"),
+        ({"initial": [0, 1, 9]}, "initial has node 9, but nodes are 0 to 3"),
+        ({"initial": [0, 1.5, 3]}, "initial has node 1.5"),
+        ({"initial": [3, 0, 2]}, "initial uses the forbidden arc 0 to 2"),
+        ({"initial": [0, 1, 3], "fixed_start": [2]}, "initial must visit the nodes of fixed_start"),
+        ({"fixed_start": [1, 2]}, "fixed_start visits cluster 1 more than once"),
+        ({"fixed_start": 1.5}, "fixed_start must be a sequence of nodes, got 1.5"),
+        ({"fixed_start": 4}, "fixed_start has node 4, but nodes are 0 to 3"),
+    ],
+)
+def test_a_bad_tour_is_one_clear_error(changes: dict[str, object], words: str) -> None:
+    costs = np.ones((4, 4))
+    costs[0, 2] = np.inf
+    with pytest.raises(InvalidInputError, match=words):
+        solve_gtsp(costs, [[0], [1, 2], [3]], **changes)  # type: ignore[arg-type]

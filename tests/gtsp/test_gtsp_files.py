@@ -178,6 +178,11 @@ def test_command_writes_a_tour(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert main(["gtsp", str(path), "--iterations", "10", "--out", str(out)]) == 0
     assert "optimal, cost 10, lower bound 10" in capsys.readouterr().out
     assert sorted(read_tour(out)) == [0, 1, 3]
+    begin = ["gtsp", str(path), "--initial", str(out), "--fixed-start"]
+    assert main([*begin, str(read_tour(out)[1] + 1)]) == 0
+    assert "optimal, cost 10" in capsys.readouterr().out
+    assert main([*begin, "9"]) == 2
+    assert "--fixed-start has node 9, but nodes are 1 to 4" in capsys.readouterr().err
     assert main(["gtsp", str(tmp_path / "none.gtsp")]) == 2
     assert "cannot read" in capsys.readouterr().err
 

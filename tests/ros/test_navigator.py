@@ -132,6 +132,19 @@ def test_what_cannot_be_served_has_the_code_of_nav2(code, call):
     assert not robot.navigator.is_driving
 
 
+@pytest.mark.parametrize("planner", ["straight", "push-aware"])
+@pytest.mark.parametrize("controller", ["path", "push-aware"])
+def test_the_orientation_of_a_goal_counts_where_a_tolerance_is_set(planner, controller):
+    tolerance = math.radians(4.0)
+    robot = Robot(planner=planner, heading_tolerance=tolerance)
+    path, _ = robot.navigator.compute_path(pose(3.0, 2.0, -2.0))
+    robot.navigator.follow(path, controller)
+    said = robot.drive(pause=0.0 if controller == "path" else 0.005)
+    assert said[-1].outcome == "SUCCEEDED"
+    assert math.dist(robot.pose[:2], (3.0, 2.0)) <= 0.1
+    assert abs(math.remainder(robot.pose[2] + 2.0, math.tau)) <= tolerance
+
+
 EMPTY = {"header": MESSAGES.header(0.0), "poses": []}
 
 
@@ -405,7 +418,7 @@ def test_markers_become_objects_that_keep_their_ids():
         markers = [marker(7, (x, 1.0, 0.3), cube=0.2), marker(3, (1.0, 2.0, 0.0), corners)]
         array = MESSAGES.make("visualization_msgs/MarkerArray", markers=markers)
         robot.scene.take_objects(array, 1e3)
-    world = robot.scene.world(robot.navigator._disc(np.array([3.0, 1.0])))
+    world = robot.scene.world(robot.navigator._goal_at(np.array([3.0, 1.0])))
     by_id = dict(zip(world.movables.ids.tolist(), range(2), strict=True))
     assert sorted(by_id) == [3, 7]
     box = world.movables.outline_world(by_id[7])

@@ -5,7 +5,7 @@ import shapely
 from conftest import make_robot, make_u_maze
 
 from pushplan.control.executors import ImmediateExecutor
-from pushplan.runtime import Runner
+from pushplan.runtime import Runner, StateEstimator
 from pushplan.world import Drive, Plan, World
 
 ROBOT = make_robot(drive=Drive.DIFFERENTIAL, max_speed=0.5, min_speed=-0.3, max_turn_rate=1.0)
@@ -40,6 +40,7 @@ def test_with_noise_a_plan_ends_so_deep_in_the_goal_that_the_robot_is_in_it() ->
         goal = MAZE.goal
         return goal.radius - float(np.hypot(*(plan.poses[-1, :2] - goal.center)))
 
-    sure = 3.0 * np.sqrt(0.3 / 1.7) * noise  # deviations left by a filter of gain 0.3
+    estimator = StateEstimator(0.0, 0.3, np.array([noise, noise, 0.0]), 1.0)
+    sure = 3.0 * estimator.remaining_noise(MAZE.robot, 0.05)[0]
     assert depth(first_plan(MAZE)) < sure
     assert depth(first_plan(MAZE, position_noise=noise)) >= sure

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from pushplan.world import (
     ClearanceArea,
     GoalLine,
+    GoalPose,
     InvalidInputError,
     Movables,
     Receptacle,
@@ -26,6 +27,7 @@ from pushplan.world import (
 
 GOALS = [
     GoalLine([0, 9], [0.1, 1]),
+    GoalPose([1 / 3, 9], 0.02, heading=-7.0, heading_tolerance=0.05),
     Receptacle(SQUARE),
     ClearanceArea(SQUARE, [True, False, True, True]),
 ]

@@ -19,6 +19,7 @@ from pushplan.world import (
     Episode,
     GoalDisc,
     GoalLine,
+    GoalPose,
     InvalidInputError,
     Movables,
     Plan,
@@ -65,6 +66,11 @@ LIMITS = {"mass": 1.0, "drive": "differential", "max_speed": 1.0, "max_turn_rate
         (lambda: StaticMap.build(bounds=[0, 0, 0, 1]), "min < max"),
         (lambda: GoalDisc([0, 0], 0.0), "goal.radius"),
         (lambda: GoalLine([0, 0], [0, 0]), "not be zero"),
+        (lambda: GoalPose([0, 0, 0], 0.1, 0.0, 0.1), "goal.center must have shape (2,)"),
+        (lambda: GoalPose([0, 0], -0.1, 0.0, 0.1), "goal.radius"),
+        (lambda: GoalPose([0, 0], 0.1, NAN, 0.1), "goal.heading must be finite, got nan"),
+        (lambda: GoalPose([0, 0], 0.1, 0.0, 0.0), "goal.heading_tolerance must lie in (0, 3.14"),
+        (lambda: GoalPose([0, 0], 0.1, 0.0, 4.0), "goal.heading_tolerance must lie in (0, 3.14"),
         (lambda: ClearanceArea(SQUARE, [True] * 3), "goal.open_edges must have shape (4,)"),
         (lambda: Receptacle([[0, 0], [1, 0]]), "3 corners"),
         (lambda: make_u_maze(robot_pose=[0, 0]), "shape (3,)"),
@@ -155,6 +161,21 @@ def test_goals_measure_and_contain():
     points = np.array([[[1.0, 1.4], [1.0, 9.0]]])
     assert disc.contains(points).tolist() == [[True, False]]
     assert line.contains(points).tolist() == [[False, True]]
+
+
+def test_a_pose_is_reached_within_both_tolerances():
+    goal = GoalPose([1, 1], 0.02, heading=3.1, heading_tolerance=0.1)
+    assert goal != GoalDisc([1, 1], 0.02)
+    assert goal.distance(1, 1.12) == pytest.approx(0.1)
+    assert goal.heading_error(-3.1) == pytest.approx(6.2 - 2.0 * np.pi)
+    for pose, there in [
+        ((1.0, 1.01, 3.1), True),
+        ((1.0, 1.01, -3.15), True),  # across the cut at π
+        ((1.0, 1.01, 3.1 + 4.0 * np.pi), True),
+        ((1.0, 1.01, 2.9), False),
+        ((1.0, 1.03, 3.1), False),
+    ]:
+        assert make_u_maze(goal=goal, robot_pose=pose).goal_reached is there
 
 
 def test_streams_depend_on_seed_and_purpose_only():

@@ -11,8 +11,9 @@ namespace pushplan {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kMaxCells = 500'000.0;
+constexpr double kMaxCells = 1'000'000.0;
 constexpr double kMargin = 0.1;         // by which a side must be inside of an outline [cells]
+constexpr double kOverlap = 0.05;       // by which outlines overlap that close a passage [cells]
 constexpr double kLongest = 1.0198039;  // greatest ratio of a chamfer distance to the length
 constexpr double kSlack = 3.0;  // of a distance, from places in cells to their centres [cells]
 constexpr std::int32_t kUnreached = std::numeric_limits<std::int32_t>::max();
@@ -51,11 +52,9 @@ void narrow(std::span<const Vec2> outline, double first, std::span<Chord> chords
   }
 }
 
-/// Marks the sides along lines of constant `y` that an outline covers, with a margin around them.
-/// Lengths are cells; side i of a line goes from i to i + 1, and `sides` has `across` for each line
-/// and `along` between them. No path goes below 0 or beyond `extent` along a line.
-void cover(std::span<const Vec2> outline, Index lines, double extent, Index along, Index across,
-           std::vector<char>& sides) {
+/// Adds the part of each line of constant `y` that an outline covers, with a margin above and below
+/// it. Lengths are cells.
+void add_chords(std::span<const Vec2> outline, std::span<std::vector<Chord>> lines) {
   double low = kInfinity;
   double high = -kInfinity;
   for (const Vec2 corner : outline) {
@@ -63,46 +62,46 @@ void cover(std::span<const Vec2> outline, Index lines, double extent, Index alon
     high = std::max(high, corner.y);
   }
   const Index first = std::max(Index{0}, ceil_index(low + kMargin));
-  const Index last = std::min(lines - 1, floor_index(high - kMargin));
-  const Index count = floor_index(extent) + 1;
+  const Index last = std::min(static_cast<Index>(lines.size()) - 1, floor_index(high - kMargin));
   if (first > last) return;
   std::vector<Chord> chords(at(last - first + 1), Chord{-kInfinity, kInfinity});
   narrow(outline, static_cast<double>(first) - kMargin, chords);
   narrow(outline, static_cast<double>(first) + kMargin, chords);
   for (Index line = first; line <= last; ++line) {
     const Chord& chord = chords[at(line - first)];
-    if (!(chord.left <= chord.right)) continue;
-    const Index begin =
-        chord.left <= 0.0 ? 0 : std::max(Index{0}, ceil_index(chord.left + kMargin));
-    const Index end =
-        chord.right >= extent ? count : std::min(count, floor_index(chord.right - kMargin));
-    for (Index i = begin; i < end; ++i) sides[at(line * across + i * along)] = 1;
+    if (chord.left <= chord.right) lines[at(line)].push_back(chord);
   }
 }
 
-struct Move {
-  Index row;
-  Index column;
-  std::int32_t cost;  // [fifths of a cell]
-};
+/// Marks the sides along lines that chords cover together, where two of them overlap surely. Side i
+/// of a line goes from i to i + 1, and `sides` has `across` for each line and `along` between them.
+/// No path goes below 0 or beyond `extent` along a line.
+void cover(std::span<std::vector<Chord>> lines, double extent, Index along, Index across,
+           std::vector<char>& sides) {
+  const Index count = floor_index(extent) + 1;
+  for (std::size_t line = 0; line < lines.size(); ++line) {
+    std::vector<Chord>& chords = lines[line];
+    std::ranges::sort(chords, {}, &Chord::left);
+    for (std::size_t next = 0; next < chords.size();) {
+      Chord run = chords[next++];
+      while (next < chords.size() && chords[next].left <= run.right - kOverlap) {
+        run.right = std::max(run.right, chords[next++].right);
+      }
+      const Index begin = run.left <= 0.0 ? 0 : std::max(Index{0}, ceil_index(run.left + kMargin));
+      const Index end =
+          run.right >= extent ? count : std::min(count, floor_index(run.right - kMargin));
+      for (Index i = begin; i < end; ++i) {
+        sides[at(static_cast<Index>(line) * across + i * along)] = 1;
+      }
+    }
+  }
+}
 
-constexpr std::array<Move, 16> kMoves{{{0, 1, 5},
-                                       {1, 0, 5},
-                                       {0, -1, 5},
-                                       {-1, 0, 5},
-                                       {1, 1, 7},
-                                       {1, -1, 7},
-                                       {-1, -1, 7},
-                                       {-1, 1, 7},
-                                       {1, 2, 11},
-                                       {2, 1, 11},
-                                       {2, -1, 11},
-                                       {1, -2, 11},
-                                       {-1, -2, 11},
-                                       {-2, -1, 11},
-                                       {-2, 1, 11},
-                                       {-1, 2, 11}}};
-constexpr std::size_t kBuckets = 12;  // more than the greatest cost
+constexpr std::array<Index, 8> kAlong{1, 1, 0, -1, -1, -1, 0, 1};  // columns of a move
+constexpr std::array<Index, 8> kUp{0, 1, 1, 1, 0, -1, -1, -1};     // rows of a move
+constexpr std::array<std::int32_t, 2> kCosts{5, 7};  // of moves straight and slanting [fifths]
+constexpr std::int32_t kKnight = 11;                 // of one of each, side by side
+constexpr std::size_t kBuckets = 2 * kKnight + 1;    // a move changes a length by less
 
 }  // namespace
 
@@ -114,8 +113,10 @@ CoveredSides::CoveredSides(Polygons outlines, const Box& box, double cell) {
   origin_ = {box.x_min, box.y_min};
   columns_ = floor_index(width / cell_) + 1;
   rows_ = floor_index(height / cell_) + 1;
-  left_.assign(at(rows_ * columns_), 0);
-  below_.assign(at(rows_ * columns_), 0);
+  std::vector<char> left(at(rows_ * columns_), 0);   // whether that side of a cell is covered
+  std::vector<char> below(at(rows_ * columns_), 0);  // and the one towards lower y
+  std::vector<std::vector<Chord>> lines_of_x(at(columns_));
+  std::vector<std::vector<Chord>> lines_of_y(at(rows_));
   std::vector<Vec2> corners;  // [cells]
   for (Index k = 0; k < outlines.count(); ++k) {
     if (outlines[k].empty()) continue;
@@ -123,9 +124,31 @@ CoveredSides::CoveredSides(Polygons outlines, const Box& box, double cell) {
     for (const Vec2 corner : outlines[k]) {
       corners.push_back({(corner.x - origin_.x) / cell_, (corner.y - origin_.y) / cell_});
     }
-    cover(corners, rows_, width / cell_, 1, columns_, below_);
+    add_chords(corners, lines_of_y);
     for (Vec2& corner : corners) std::swap(corner.x, corner.y);
-    cover(corners, columns_, height / cell_, columns_, 1, left_);
+    add_chords(corners, lines_of_x);
+  }
+  cover(lines_of_y, width / cell_, 1, columns_, below);
+  cover(lines_of_x, height / cell_, columns_, 1, left);
+  moves_.assign(at(rows_ * columns_), 0);
+  const auto open = [&](int direction, Index from, Index to) {
+    moves_[at(from)] |= static_cast<std::uint8_t>(1 << direction);
+    moves_[at(to)] |= static_cast<std::uint8_t>(1 << (direction + 4));
+  };
+  for (Index here = 0; here < rows_ * columns_; ++here) {
+    if (here % columns_ > 0 && left[at(here)] == 0) open(0, here - 1, here);
+    if (here >= columns_ && below[at(here)] == 0) open(2, here - columns_, here);
+  }
+  for (Index here = 0; here < (rows_ - 1) * columns_; ++here) {  // one straight move and another
+    const Index above = here + columns_;
+    const bool up = leads(here, 2);
+    for (const int direction : {1, 3}) {
+      const int beside = 2 * direction - 2;
+      const Index side = direction == 1 ? 1 : -1;
+      if ((up && leads(above, beside)) || (leads(here, beside) && leads(here + side, 2))) {
+        open(direction, here, above + side);
+      }
+    }
   }
 }
 
@@ -141,72 +164,95 @@ Vec2 CoveredSides::centre(Index cell) const {
           origin_.y + (static_cast<double>(cell / columns_) + 0.5) * cell_};
 }
 
-bool CoveredSides::covered(Index cell, Index neighbour) const {
-  const Index higher = std::max(cell, neighbour);
-  const bool beside = higher - std::min(cell, neighbour) == 1;
-  return (beside ? left_ : below_)[at(higher)] != 0;
-}
-
 GoalEstimate::GoalEstimate(const CoveredSides& cells, const Regions& regions, Vec2 start)
-    : cells_(cells), distances_(at(cells.rows() * cells.columns()), kUnreached) {
-  const Index rows = cells.rows();
-  const Index columns = cells.columns();
-  const Index wanted = cells.cell_of(start);
-  std::array<std::vector<Index>, kBuckets> buckets;
+    : cells_(cells),
+      wanted_(cells.cell_of(start)),
+      distances_(at(cells.rows() * cells.columns()), kUnreached),
+      buckets_(kBuckets),
+      empty_(static_cast<std::int32_t>(kBuckets)),
+      end_(kUnreached),
+      rest_(kUnreached) {
   const double half = (1.0 + 1e-6) * cells.cell() * std::sqrt(0.5);  // a goal may lie on a corner
-  for (Index i = 0; i < rows * columns; ++i) {
-    if (region_distance(cells.centre(i), regions) <= half) {
-      distances_[at(i)] = 0;
-      buckets[0].push_back(i);
-    }
-  }
-  const auto slants = [&](Index from, Index to) {  // by one straight move and another
-    const Index first = from / columns * columns + to % columns;
-    const Index second = to / columns * columns + from % columns;
-    return (!cells.covered(from, first) && !cells.covered(first, to)) ||
-           (!cells.covered(from, second) && !cells.covered(second, to));
-  };
-  std::int32_t end = kUnreached;  // beyond what matters
-  std::int32_t empty = 0;         // buckets in a row
-  rest_ = kUnreached;
-  for (std::int32_t now = 0; empty < static_cast<std::int32_t>(kBuckets); ++now) {
-    std::vector<Index>& bucket = buckets[static_cast<std::size_t>(now) % kBuckets];
-    empty = bucket.empty() ? empty + 1 : 0;
-    if (now > end) {
-      rest_ = now;
-      break;
-    }
-    for (const Index here : bucket) {
-      if (distances_[at(here)] != now) continue;
-      if (here == wanted) end = now + now / 8 + 100;
-      const Index row = here / columns;
-      const Index column = here % columns;
-      for (const Move& move : kMoves) {
-        const Index r = row + move.row;
-        const Index c = column + move.column;
-        if (r < 0 || c < 0 || r >= rows || c >= columns) continue;
-        const Index to = r * columns + c;
-        if (distances_[at(to)] <= now + move.cost) continue;
-        if (move.cost == 5 && cells.covered(here, to)) continue;
-        if (move.cost == 7 && !slants(here, to)) continue;
-        if (move.cost == 11) {  // a straight move and a slanting one, in either order
-          const Index first = (row + move.row / 2) * columns + column + move.column / 2;
-          const Index second = (r - move.row / 2) * columns + c - move.column / 2;
-          if ((cells.covered(here, first) || !slants(first, to)) &&
-              (!slants(here, second) || cells.covered(second, to))) {
-            continue;
-          }
-        }
-        distances_[at(to)] = now + move.cost;
-        buckets[static_cast<std::size_t>(now + move.cost) % kBuckets].push_back(to);
+  const Index columns = cells.columns();
+  for (Index row = 0; row < cells.rows(); ++row) {
+    for (Index column = 0; column < columns; ++column) {
+      const Index here = row * columns + column;
+      const double beyond = (region_distance(cells.centre(here), regions) - half) / cells.cell();
+      if (beyond <= 0.0) {
+        distances_[at(here)] = 0;
+        goals_.push_back(here);
+      } else if (beyond > 2.0) {  // nor are the next ones in it
+        column += static_cast<Index>(std::min(beyond, static_cast<double>(columns))) - 1;
       }
     }
+  }
+  std::sort(goals_.begin(), goals_.end(),
+            [&](Index a, Index b) { return to_start(a) > to_start(b); });
+}
+
+std::int32_t GoalEstimate::to_start(Index cell) const {
+  const Index columns = cells_.columns();
+  const Index x = std::abs(cell % columns - wanted_ % columns);
+  const Index y = std::abs(cell / columns - wanted_ / columns);
+  const Index more = std::max(x, y);
+  const Index less = std::min(x, y);
+  return static_cast<std::int32_t>(std::max(5 * more + less, 4 * more + 3 * less));
+}
+
+bool GoalEstimate::run(Index cells) {
+  while (rest_ == kUnreached) {
+    if (empty_ == static_cast<std::int32_t>(kBuckets)) {
+      if (goals_.empty()) return true;
+      now_ = to_start(goals_.back());
+      empty_ = 0;
+    }
+    std::vector<Index>& bucket = buckets_[static_cast<std::size_t>(now_) % kBuckets];
+    for (; !goals_.empty() && to_start(goals_.back()) == now_; goals_.pop_back()) {
+      bucket.push_back(goals_.back());
+    }
+    if (now_ > end_) {
+      rest_ = now_;
+      break;
+    }
+    if (cells <= 0) return false;
+    empty_ = bucket.empty() ? empty_ + 1 : 0;
+    cells -= static_cast<Index>(bucket.size());
+    // a way may go on without becoming longer
+    for (std::size_t i = 0; i < bucket.size(); ++i) spread(bucket[i]);
     bucket.clear();
+    ++now_;
+  }
+  return true;
+}
+
+void GoalEstimate::spread(Index here) {
+  const std::int32_t distance = distances_[at(here)];
+  if (distance + to_start(here) != now_) return;  // there was a shorter way
+  if (here == wanted_) end_ = now_ + now_ / 8 + 100;
+  const Index columns = cells_.columns();
+  const auto reach = [&](Index to, std::int32_t cost) {
+    if (distances_[at(to)] <= distance + cost) return;
+    distances_[at(to)] = distance + cost;
+    const auto length = static_cast<std::size_t>(distance + cost + to_start(to));
+    buckets_[length % kBuckets].push_back(to);
+  };
+  for (int direction = 0; direction < 8; ++direction) {
+    const auto left = static_cast<std::size_t>(direction + 1) & 7;
+    const Index first = here + kUp[at(direction)] * columns + kAlong[at(direction)];
+    const Index second = here + kUp[left] * columns + kAlong[left];
+    const bool leads = cells_.leads(here, direction);
+    if (leads) reach(first, kCosts[at(direction & 1)]);
+    if ((leads && cells_.leads(first, direction + 1)) ||
+        (cells_.leads(here, direction + 1) && cells_.leads(second, direction))) {
+      reach(first + second - here, kKnight);
+    }
   }
 }
 
 double GoalEstimate::from(Vec2 p) const {
-  std::int32_t distance = std::min(distances_[at(cells_.cell_of(p))], rest_);
+  const Index cell = cells_.cell_of(p);
+  std::int32_t distance = distances_[at(cell)];
+  if (rest_ != kUnreached) distance = std::min(distance, std::max(rest_ - to_start(cell), 0));
   if (distance == kUnreached) return kInfinity;
   const double cells = distance / (5.0 * kLongest) - kSlack;
   return (1.0 + kLonger) * cells_.cell() * std::max(cells, 0.0);

@@ -6,9 +6,8 @@
 
 namespace pushplan {
 
-void fill_cell_weights(ArrayView<double, 2> extra, const Cells& cells, const Polygons& polygons,
-                       std::span<const CellBox> within, const Surcharge& surcharge) {
-  std::fill_n(extra.data(), extra.size(), 0.0);
+void add_cell_weights(ArrayView<double, 2> extra, const Cells& cells, const Polygons& polygons,
+                      std::span<const CellBox> within, const Surcharge& surcharge) {
   for (Index k = 0; k < polygons.count(); ++k) {
     const auto at = static_cast<std::size_t>(k);
     const CellBox& box = within[at];

@@ -1,12 +1,15 @@
 #include "pushplan/motion/collision.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "pushplan/geometry/convex.hpp"
 #include "pushplan/geometry/obstacles.hpp"
 
 namespace pushplan {
 namespace {
+
+constexpr Index kRun = 32;  // poses for which groups that are near are looked for together
 
 /// True if the square around a disc overlaps a box.
 bool reaches(const Box& box, const Pose& at, double radius) {
@@ -39,33 +42,59 @@ bool CollisionChecker::overlaps(Polygon obstacle) const {
   return false;
 }
 
+bool CollisionChecker::touches(const Pose& pose, Index group, bool& placed) {
+  if (!reaches(obstacles_.groups[static_cast<std::size_t>(group)], pose, footprint_.radius)) {
+    return false;
+  }
+  const Index first = group * ConvexObstacles::kGroup;
+  const Index end = std::min(first + ConvexObstacles::kGroup, obstacles_.count());
+  for (Index s = first; s < end; ++s) {
+    if (!reaches(obstacles_.boxes[static_cast<std::size_t>(s)], pose, footprint_.radius)) continue;
+    if (!placed) {
+      transform(pose, footprint_.parts.vertices, corners_.data());
+      placed = true;
+    }
+    if (overlaps(obstacles_.polygons[s])) return true;
+  }
+  return false;
+}
+
 bool CollisionChecker::is_free(const Pose& pose) {
   if (!obstacles_.bounds.contains({pose.x, pose.y}, 0.0)) return false;
   bool placed = false;
-  Index first = 0;
-  for (const Box& group : obstacles_.groups) {
-    const Index end = std::min(first + ConvexObstacles::kGroup, obstacles_.count());
-    if (reaches(group, pose, footprint_.radius)) {
-      for (Index s = first; s < end; ++s) {
-        if (!reaches(obstacles_.boxes[static_cast<std::size_t>(s)], pose, footprint_.radius)) {
-          continue;
-        }
-        if (!placed) {
-          transform(pose, footprint_.parts.vertices, corners_.data());
-          placed = true;
-        }
-        if (overlaps(obstacles_.polygons[s])) return false;
-      }
-    }
-    first += ConvexObstacles::kGroup;
+  for (Index group = 0; group < obstacles_.group_count(); ++group) {
+    if (touches(pose, group, placed)) return false;
   }
   return true;
 }
 
 Index CollisionChecker::first_blocked(std::span<const Pose> poses) {
-  const auto blocked =
-      std::find_if(poses.begin(), poses.end(), [&](const Pose& pose) { return !is_free(pose); });
-  return blocked - poses.begin();
+  const auto count = static_cast<Index>(poses.size());
+  for (Index first = 0; first < count; first += kRun) {
+    const Index end = std::min(first + kRun, count);
+    const auto run =
+        poses.subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(end - first));
+    const auto [left, right] = std::ranges::minmax(run, {}, &Pose::x);
+    const auto [low, high] = std::ranges::minmax(run, {}, &Pose::y);
+    const Pose middle{0.5 * (left.x + right.x), 0.5 * (low.y + high.y), 0.0};
+    const double half = std::max(right.x - left.x, high.y - low.y);  // twice what is needed
+    near_.clear();
+    for (Index group = 0; group < obstacles_.group_count(); ++group) {
+      const Box& box = obstacles_.groups[static_cast<std::size_t>(group)];
+      if (!std::isfinite(half) || reaches(box, middle, half + footprint_.radius)) {
+        near_.push_back(group);
+      }
+    }
+    for (Index i = first; i < end; ++i) {
+      const Pose& pose = poses[static_cast<std::size_t>(i)];
+      bool placed = false;
+      if (!obstacles_.bounds.contains({pose.x, pose.y}, 0.0) ||
+          std::ranges::any_of(near_, [&](Index k) { return touches(pose, k, placed); })) {
+        return i;
+      }
+    }
+  }
+  return count;
 }
 
 double CollisionChecker::depth(const Pose& pose) {

@@ -8,6 +8,7 @@ Index lay_out(const Pose& start, std::span<const Arc> arcs, const SweptPath& pat
   path.curvatures[0] = 0.0;
   const Index found = sample_arcs(start, arcs, problem.spacing, path.buffer().from(1));
   if (found < 0) return 0;
+  if (problem.goal.has_heading()) return found + 1;
   for (Index i = 0; i <= found; ++i) {
     const Pose& pose = path.poses[static_cast<std::size_t>(i)];
     if (problem.goal.contains({pose.x, pose.y})) return i + 1;

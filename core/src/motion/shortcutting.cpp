@@ -1,6 +1,7 @@
 #include "pushplan/motion/shortcutting.hpp"
 
 #include <cmath>
+#include <limits>
 
 #include "pushplan/motion/shortcut.hpp"
 
@@ -70,7 +71,11 @@ ShortcutProposal propose_shortcut(const SweptPath& path, Index count, const Shor
   if (to_end) last = count - 1;
   const ShortcutProposal none{first, 0, 0};
   Pose target = path.poses[at(last)];
-  if (to_end) target = new_end(path.poses[at(first)], path.poses[at(count - 1)], shift, problem);
+  const GoalRegion& goal = problem.goal;
+  const bool to_place = to_end && (goal.turns || !goal.has_heading());
+  if (to_place) {
+    target = new_end(path.poses[at(first)], path.poses[at(count - 1)], shift, problem);
+  }
   const Path old{path.poses.first(at(count)), path.curvatures.first(at(count))};
   const PathBuffer out = trial.buffer();
   Index size = copy_start(old, first, out);
@@ -89,11 +94,18 @@ ShortcutProposal propose_shortcut(const SweptPath& path, Index count, const Shor
     if (!drive_to(displace(path.poses[at((first + last) / 2)], sideways, turn))) return none;
   }
   if (!drive_to(target)) return none;
-  const Index added = size - first - 1;
   const Pose arrived = out.poses[at(size - 1)];
   const double miss = std::abs(arrived.x - target.x) + std::abs(arrived.y - target.y);
   if (miss > 1e-3 * problem.spacing) return none;
-  if (to_end && !problem.goal.contains({arrived.x, arrived.y})) return none;
+  if (to_place && !goal.contains({arrived.x, arrived.y})) return none;
+  if (to_end && goal.turns) {
+    const double angle = wrap_below_pi(goal.heading - arrived.theta);
+    const Arc turn{std::abs(angle), std::copysign(std::numeric_limits<double>::infinity(), angle)};
+    const Index turned = sample_arcs(arrived, {&turn, 1}, problem.spacing, out.from(size));
+    if (turned < 0) return none;
+    size += turned;
+  }
+  const Index added = size - first - 1;
   const Index rest = count - 1 - last;
   if (to_end || rest == 0) return {first, added, size};
   if (size + rest > out.size()) return none;

@@ -33,7 +33,6 @@ PROGRESS_REWARD = 150.0
 _LEAN = 0.02
 """Tolerance by which a corner may be outside a receptacle, as a fraction of the object's radius: an
 object that leans on a wall overlaps it a little."""
-_IMAGE_CHANNELS = ("footprint", "movable", "static", "goal_distance")
 _CELLS = 200
 """Of the goal distance field, along the longer side of the room."""
 _SHORTEST_WAYS = 10.0
@@ -49,14 +48,10 @@ PRESETS = read_presets("room")
 
 
 @dataclass(frozen=True, kw_only=True)
-class RoomVariations(TaskVariations):
-    """Variations of the Room task; None leaves the preset's value."""
+class WorldVariations(TaskVariations):
+    """Variations of tasks in a given world; None leaves the preset's value."""
 
-    task = "room"
-
-    # the world, as `pushplan.world.load_world` reads it; a room of 3 m with two boxes if None
-    world_file: str | None = None
-    # greatest distance of robot and objects from where the file has them, as drawn by the
+    # greatest distance of robot and objects from where the world has them, as drawn by the
     # seed [m]; they are turned by as much at their rims
     spread: NonNegativeFloat = 0.0
     # when the episode is cut off [s]; if None after ten times the shortest way at full speed, for
@@ -64,6 +59,16 @@ class RoomVariations(TaskVariations):
     time_limit: PositiveFloat | None = None
     # when it is cut off after the last object that was done [s]; never if None
     idle_limit: PositiveFloat | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RoomVariations(WorldVariations):
+    """Variations of the Room task; None leaves the preset's value."""
+
+    task = "room"
+
+    # the world, as `pushplan.world.load_world` reads it; a room of 3 m with two boxes if None
+    world_file: str | None = None
 
 
 class RoomTask(Task):
@@ -86,11 +91,14 @@ class RoomTask(Task):
     actions: ClassVar[tuple[str, ...]] = ("velocity", "wheels")
     observations: ClassVar[tuple[str, ...]] = ("image", "state")
 
+    image_channels: tuple[str, ...] = ("footprint", "movable", "static", "goal_distance")
+
     preset_table = PRESETS
-    variations: RoomVariations
-    variation_class = RoomVariations
+    variations: WorldVariations
+    variation_class: ClassVar[type[WorldVariations]] = RoomVariations
 
     def _prepare(self) -> None:
+        assert isinstance(self.variations, RoomVariations)
         path = self.variations.world_file
         try:
             world = load_world(SMALL_ROOM if path is None else path)
@@ -148,7 +156,7 @@ class RoomTask(Task):
         return max(_SHORTEST_WAYS * self._way / self.robot.max_speed, _LEAST_TIME)
 
     def start(self, rng: np.random.Generator) -> World:
-        """The world of the file, with the robot and the objects moved a little if asked for."""
+        """The world, with the robot and the objects moved a little if asked for."""
         self._steps = 0
         self._idle_since = 0
         return self._spread(rng) if self.variations.spread else self._world
@@ -195,14 +203,18 @@ class RoomTask(Task):
         """The reward above; walls end it only where the robot has the goal."""
         if self.goal_kind == "objects":
             return self._score_objects(before, after)
-        near, far = (self._field.sample(*world.robot_pose[:2]) for world in (after, before))
-        reward = PROGRESS_REWARD * (far - near - work / self._world.robot.mass) / self._way
+        closer = self._robot_distance(before) - self._robot_distance(after)
+        reward = PROGRESS_REWARD * (closer - work / self._world.robot.mass) / self._way
         at = after.robot_pose[:2]
         bounds = self._world.static.bounds
         failure = "wall" if touched_static else ""
         if not failure and ((at < bounds[:2]).any() or (at > bounds[2:]).any()):
             failure = "left_map"
         return self._checked_for_time(self._driven(reward, after, failure=failure))
+
+    def _robot_distance(self, world: World) -> float:
+        """Goal distance of the robot [m]."""
+        return self._field.sample(*world.robot_pose[:2])
 
     def _score_objects(self, before: World, after: World) -> StepOutcome:
         self._steps += 1
@@ -251,7 +263,7 @@ class RoomTask(Task):
 
     def _image(self, name: str) -> ImageObservation:
         window = _WINDOW * 2.0 * self.robot.circumscribed_radius
-        return ImageObservation(channels=_IMAGE_CHANNELS, window=(window, window))
+        return ImageObservation(channels=self.image_channels, window=(window, window))
 
 
 def _shape(pose: FloatArray, parts: list[FloatArray]) -> shapely.Geometry:

@@ -14,7 +14,7 @@ import numpy as np
 from pushplan.evaluation.statistics.stored_run import StoredRun
 from pushplan.evaluation.store.rows import ResultRow
 from pushplan.files.output_files import make_folder, write_atomic
-from pushplan.world import Episode, GoalDisc, GoalLine, Movables, SchemaError
+from pushplan.world import Episode, GoalDisc, GoalLine, GoalPose, Movables, SchemaError
 from pushplan.world.checks import FloatArray
 from pushplan.world.stored.recorded_plans import thinned
 
@@ -89,6 +89,8 @@ def _scene(episode: Episode) -> dict[str, Any]:
     goal = world.goal
     if isinstance(goal, GoalDisc):
         shown = {"kind": "disc", "center": _flat(goal.center), "radius": goal.radius}
+        if isinstance(goal, GoalPose):
+            shown["heading"] = goal.heading
     elif isinstance(goal, GoalLine):
         shown = {"kind": "line", "point": _flat(goal.point), "normal": _flat(goal.normal)}
     else:

@@ -12,10 +12,11 @@ from pushplan.geometry import Grid, clearance_field
 from pushplan.geometry.free_components import FreeComponents, object_clearance
 from pushplan.motion.time_slicing import go_on, never
 from pushplan.search.grid_dijkstra import grid_dijkstra
-from pushplan.world import Movables, World
+from pushplan.world import GoalDisc, GoalPose, Movables, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 _KEPT = 200  # distances to objects that are kept
+_NEAR_POSE = 0.75  # distance from a goal pose at which a cell counts as the goal [cells]
 
 
 class DiscSpace:
@@ -44,7 +45,10 @@ class DiscSpace:
         self.stopped = stopped
         self.grid = Grid.cover(world.static.bounds, cell)
         x, y = np.meshgrid(self.grid.x, self.grid.y)
-        self.goal: BoolArray = world.navigation_goal.contains(np.stack([x, y], axis=-1))
+        goal = world.navigation_goal
+        if isinstance(goal, GoalPose):  # smaller than a cell: plans drive on to its middle
+            goal = GoalDisc(goal.center, _NEAR_POSE * cell)
+        self.goal: BoolArray = goal.contains(np.stack([x, y], axis=-1))
         clearance_at = functools.partial(
             _clearance_at, world.movables, self.grid, self.radius + self.cell
         )

@@ -10,7 +10,7 @@ from pushplan.interaction import InteractionModel
 from pushplan.motion.keyholes.keyhole_search import KeyholeEnd
 from pushplan.motion.speed_profile import timed_plan
 from pushplan.motion.swept_path import SweptPath
-from pushplan.world import Plan, World
+from pushplan.world import GoalPose, Plan, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import arc_lengths, step_lengths
 
@@ -51,6 +51,10 @@ def _driven(world: World, end: KeyholeEnd) -> tuple[FloatArray, FloatArray]:
         track.turn(float(push.path[0, 2]))
         track.follow(push.path)
     track.drive(end.state.path_to_goal())
+    goal = world.goal
+    if isinstance(goal, GoalPose):
+        track.drive(np.array([track.poses[-1][:2], goal.center]))
+        track.turn(goal.heading)
     return np.array(track.poses), np.array(track.curvatures)
 
 

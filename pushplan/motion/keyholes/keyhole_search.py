@@ -23,13 +23,14 @@ from pushplan.motion.keyholes.line_pushes import (
     straight_poses,
 )
 from pushplan.motion.time_slicing import go_on, never
-from pushplan.world import Drive, World
+from pushplan.world import Drive, GoalPose, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import path_length, path_lengths
 
 _MOST_OBJECTS = 40  # among more, no keyholes are looked for
 _MOST_CELLS = 400_000  # of the configuration space
 _SAME_HEADING = 0.3  # scenes whose objects differ by less count as one [rad]
+_TURNS_IN = 1.02  # free disc in which the robot turns to its goal's heading [R]
 _LEAVING = 2.5  # length of a straight drive to where its disc is free [circumscribed radii]
 
 
@@ -67,6 +68,11 @@ def suits_keyholes(world: World, config: KeyholeConfig) -> bool:
     """
     robot = world.robot
     static = world.static
+    goal = world.goal
+    if isinstance(goal, GoalPose):
+        x, y = goal.center
+        if not obstacles(static).can_turn(x, y, _TURNS_IN * robot.circumscribed_radius):
+            return False
     sides = (static.bounds[2:] - static.bounds[:2]) / (config.cell * robot.circumscribed_radius)
     return (
         robot.drive is Drive.DIFFERENTIAL

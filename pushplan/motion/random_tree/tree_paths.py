@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from pushplan.motion.random_tree.targets import Targets
 from pushplan.motion.room_ahead import gets_away, is_boxed_in
 from pushplan.motion.speed_profile import TIGHTEST
 from pushplan.motion.start_turn import drive_to_turn, start_turn
-from pushplan.world import Drive
+from pushplan.world import Drive, GoalDisc
 from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import path_length
 
@@ -114,8 +115,7 @@ class TreePaths:
         among = room.walls
         shape = room.footprint
         if np.isinf(push_weight):
-            boxes = world.movables.every_part_world
-            among = obstacles(keep_out(world), boxes)
+            among = self._among
             if not core.CollisionChecker(shape, among).is_free(improver.lead.pose):
                 return None  # the robot touches an object already: only pushing helps
         coarse = coarse_path(world, push_weight, improver.stopped)
@@ -148,14 +148,21 @@ class TreePaths:
         spread = _COARSE_PATH_SPREAD * size
         bounds = world.static.bounds
         targets = Targets(coarse, self._fraction, spread, bounds, improver.rng)
-        growth = TreeGrowth(
-            improver.lead.pose, improver.goal, targets, limits, bounds, shape, among
-        )
+        goal = improver.goal
+        if isinstance(goal, GoalDisc) and improver.pose_goal is not None:
+            goal = GoalDisc(goal.center, size)  # the end of its path is made anew
+        growth = TreeGrowth(improver.lead.pose, goal, targets, limits, bounds, shape, among)
         arcs = growth.grow(int(improver.rng.integers(1, 2**31)), done, improver.stopped)
         if arcs is None:
             return None
         improver.nodes += len(arcs)
         return improver.candidate(arcs)
+
+    @cached_property
+    def _among(self) -> core.ConvexObstacles:
+        """Walls and objects, where they are at first."""
+        world = self._improver.world
+        return obstacles(keep_out(world), world.movables.every_part_world)
 
     def _around_walls(self) -> FloatArray:
         """A path around the walls alone, where the coarse grid misses a narrow passage."""

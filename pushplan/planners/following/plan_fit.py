@@ -56,7 +56,8 @@ class PlanFit:
 
     def is_used_up(self, world: World, plan: Plan) -> bool:
         """Return True if the robot is at the end of the plan."""
-        return self._progress.update(plan, world.robot_pose) >= self._progress.total - 1e-9
+        self._progress.update(plan, world.robot_pose)
+        return self._progress.is_over
 
     def free_length(self, world: World, plan: Plan) -> float:
         """Length of the plan's rest before static obstacles that are new to it [m]."""
@@ -130,7 +131,7 @@ class PlanFit:
         here = self._progress.pose(along)
         if rested and np.hypot(x - here[0], y - here[1]) > rule.offset * size:
             return Reason.OFFSET
-        if along >= self._progress.total - 1e-9:
+        if self._progress.is_over:
             return Reason.USED_UP if rested else None
         if self._tight and waited >= _TIGHT_PAUSES * pause:
             return Reason.TIGHT  # there may be a plan that keeps its distance

@@ -28,6 +28,7 @@ from pushplan.world import (
     Controller,
     GoalDisc,
     GoalLine,
+    GoalPose,
     InvalidInputError,
     Plan,
     Planner,
@@ -238,7 +239,9 @@ class PlanFollower:
         self._fruitless.clear()
         new = pending.from_now_on(result.plan, world)
         old = self.current_plan
-        if old is not None and not pending.reason.urgent:
+        # from a tight curve into a pose a new plan may have to come round again
+        curves = pending.reason is Reason.TIGHT and isinstance(world.goal, GoalPose)
+        if old is not None and (curves or not pending.reason.urgent):
             weight = self.replanning.weight(self.planner)
             rest = self._fit.rest_unless_cheaper(world, old, new, self.interaction, weight)
             if rest is not None:

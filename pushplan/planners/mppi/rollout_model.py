@@ -169,7 +169,7 @@ def _problem(world: World, config: MppiConfig, period: float, substeps: int) -> 
     has_goal = isinstance(world.goal, GoalDisc | GoalLine)
     goal = np.zeros(5)  # not read where the robot has none
     if has_goal:
-        goal = goal_numbers(world.navigation_goal, 0.0)
+        goal = goal_numbers(world.place_goal, 0.0)
     return core.RolloutProblem(
         period,
         substeps,

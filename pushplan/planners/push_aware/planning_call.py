@@ -8,9 +8,9 @@ import numpy as np
 
 from pushplan.core import planners as core
 from pushplan.core import search
-from pushplan.motion.dubins_warm_start import warm_start
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.length_bound import length_bound
+from pushplan.motion.local_windows import warm_start
 from pushplan.motion.path_improver import Candidate, PathImprover
 from pushplan.motion.path_search_config import INSET, LEAST_GAIN
 from pushplan.motion.random_tree.tree_paths import TreePaths
@@ -83,7 +83,7 @@ class PushAwareSearch:
         """Search until the stop rule fires; None where there is no plan by then."""
         improver = self.improver
         status = self._first_plan()
-        self.bound = length_bound(self.world, improver.stopped)
+        self.bound = length_bound(improver.given, improver.stopped)
         if status is not None:
             return status
         table = self._table()

@@ -15,6 +15,7 @@ from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.push_simulator import PushAttempt, simulate
 from pushplan.planners.rearrangement.push_starts import heading_axes, initial_heading
 from pushplan.planners.rearrangement.rearrangement_config import PushPrimitive
+from pushplan.planners.rearrangement.search_budget import SearchBudget
 from pushplan.world import ClearanceArea
 from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import path_length
@@ -44,53 +45,98 @@ GAIN = 1.0
 [circumscribed radii]."""
 
 
-def delivering_pushes(scene: PushScene, objects: Sequence[int]) -> list[Push]:
+Found = tuple[tuple[int, int], list[Push]]
+"""Pushes of one attempt, after the row of the table and the number of the attempt."""
+
+
+class PushPool:
+    """Pushes that are found one attempt after the other, as long as there is time.
+
+    Args:
+        source: of the pushes.
+
+    Attributes:
+        complete: there are no more.
+    """
+
+    def __init__(self, source: Iterator[Found]) -> None:
+        self._source = source
+        self._found: list[Found] = []
+        self.complete = False
+
+    def fill(self, budget: SearchBudget) -> list[Push]:
+        """Go on until there are no more or the budget ends it; all pushes so far, in order."""
+        while not self.complete and not budget.no_more_candidates:
+            found = next(self._source, None)
+            if found is None:
+                self.complete = True
+            else:
+                self._found.append(found)
+        self._found.sort(key=lambda one: one[0])
+        return [push for _, pushes in self._found for push in pushes]
+
+
+def delivering_pushes(scene: PushScene, objects: Sequence[int]) -> Iterator[Found]:
     """Pushes after which an object is where it belongs, row by row of the table.
+
+    Of a row, those that may be the cheapest of their objects come first.
 
     Args:
         scene: the scene.
         objects: indices of those to push, the most urgent first.
     """
     ids = scene.movables.ids.tolist()
-    found: list[Push] = []
+    here = scene.world.robot_pose[:2]
     counts: Counter[int] = Counter()
-    for row in scene.config.primitives:
+    found = False
+    for number, row in enumerate(scene.config.primitives):
         if row.controller == "arc":
             continue
         few = [k for k in objects if counts[ids[k]] < row.below]
+        tried: list[tuple[int, float, int, PushAttempt]] = []
         for k in few[:_HARD_OBJECTS] if row.below == 1 and found else few:
+            first = len(tried)
+            own: list[tuple[float, int, PushAttempt]] = []
             for attempt in attempts(scene, k, row):
-                if scene.budget.is_used_up:
-                    break
-                pushes = simulate(scene, attempt)
-                if all(
-                    simulate(scene, replace(attempt, friction=friction))
-                    for friction in (row.frictions if pushes else ())
-                ):
-                    found += pushes
-                    counts.update(i for push in pushes for i in push.delivers)
-    return found
+                bound = math.dist(here, attempt.start[:2])
+                bound += (1.0 + float(scene.weights[k])) * attempt.least
+                own.append((bound, first + len(own), attempt))
+            own.sort(key=lambda one: one[:2])
+            tried += [(rank, *one) for rank, one in enumerate(own)]
+            yield (number, -1), []
+        for _, _, index, attempt in sorted(tried, key=lambda one: one[:3]):
+            pushes = simulate(scene, attempt)
+            if all(
+                simulate(scene, replace(attempt, friction=friction))
+                for friction in (row.frictions if pushes else ())
+            ):
+                found = found or bool(pushes)
+                counts.update(i for push in pushes for i in push.delivers)
+                yield (number, index), pushes
+            else:
+                yield (number, index), []
 
 
-def partial_pushes(scene: PushScene, k: int) -> Iterator[Push]:
+def partial_pushes(scene: PushScene, k: int) -> Iterator[Found]:
     """Pushes of an object along its path that end before something goes wrong, and what is left.
 
     Each costs what is left to be done, and a radius or two for another push.
     """
     costs = scene.push_cost_to_go(k)
     now = costs.at(scene.poses[k])
-    for row in scene.config.primitives:
+    for number, row in enumerate(scene.config.primitives):
         if row.controller != "path" or row.deep or row.partners:
             continue
-        for attempt in attempts(scene, k, row):
-            if scene.budget.is_used_up:
-                return
+        for index, attempt in enumerate(attempts(scene, k, row)):
+            pushes = []
             for whole in simulate(scene, replace(attempt, relocates=True)):
                 limit = whole.length - _EARLY * scene.size
                 for push in simulate(scene, replace(attempt, relocates=True, limit=limit)):
                     left = costs.at(push.object_poses[k])
                     if left < now - GAIN * scene.size:
-                        yield replace(push, cost=push.cost + left + _NEXT_PUSH * scene.size)
+                        cost = push.cost + left + _NEXT_PUSH * scene.size
+                        pushes.append(replace(push, cost=cost))
+            yield (number, index), pushes
 
 
 def attempts(scene: PushScene, k: int, row: PushPrimitive) -> Iterator[PushAttempt]:
@@ -103,7 +149,8 @@ def attempts(scene: PushScene, k: int, row: PushPrimitive) -> Iterator[PushAttem
         extra = _EXTRA_LENGTH
         if row.leans[0]:
             extra += _TURN_LENGTH
-        limit = _LENGTH_FACTOR * path_length(path) + extra * scene.size
+        length = path_length(path)
+        limit = _LENGTH_FACTOR * length + extra * scene.size
         shifts = [fraction * scene.half for fraction in row.shifts]
         if shift_of_path is not None:
             shifts = [shift_of_path]
@@ -111,7 +158,7 @@ def attempts(scene: PushScene, k: int, row: PushPrimitive) -> Iterator[PushAttem
             start = scene.starts.behind(k, towards + math.radians(lean), aside)
             if scene.starts.fits(start):
                 for gain in row.gains:
-                    yield PushAttempt(start, k, limit, path, aside, wanted, gain)
+                    yield PushAttempt(start, k, limit, path, aside, wanted, gain, least=length)
 
 
 def open_edges(area: ClearanceArea) -> Iterator[tuple[FloatArray, FloatArray, FloatArray, float]]:
@@ -138,7 +185,8 @@ def _line_attempts(scene: PushScene, k: int, row: PushPrimitive) -> Iterator[Pus
         for lean in row.leans:
             heading = math.atan2(normal[1], normal[0]) + math.radians(lean)
             u, v = heading_axes(heading)
-            out = box + far / float(u @ normal) * u - a
+            straight = far / float(u @ normal)
+            out = box + straight * u - a
             if not 0.0 <= float(out @ along) <= length:
                 continue
             tried: list[list[int]] = []
@@ -149,7 +197,7 @@ def _line_attempts(scene: PushScene, k: int, row: PushPrimitive) -> Iterator[Pus
                 wanted = [j for j in scene.left if j == k or swept[j]]
                 if tried.count(wanted) < 2 and scene.starts.fits(start):
                     tried.append(wanted)
-                    yield PushAttempt(start, k, scene.longest, wanted=wanted)
+                    yield PushAttempt(start, k, scene.longest, wanted=wanted, least=straight)
 
 
 def _paths(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -26,11 +26,13 @@ from pushplan.planners.rearrangement.rearrangement_policy import (
 )
 from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.world import InvalidInputError, Plan, PlanningExecutor, Stop, Twist, World
-from pushplan.world.checks import FloatArray, expect
+from pushplan.world.checks import FloatArray, IntArray, expect
 
 _SAME_OBJECTS = 0.05  # objects have not moved if all by less [circumscribed radii]
 _SAME_PLACE = 0.02  # the robot has not moved if by less [circumscribed radii, rad]
 _MOST_ENDS = 4  # pushes and recoveries that may end in one step until the robot waits
+_COLLECTING = 0.5  # part of a pause in which pushes are simulated and no order is made
+_SETTLING = 0.5  # time after which a robot that pauses stands, unless what it sees is noisy [s]
 _RETREAT = 0.3  # distance that the robot backs off where it makes no progress [circumscribed radii]
 
 
@@ -44,8 +46,9 @@ class GtspMpc(RearrangementPolicy):
 
     Args:
         config: settings.
-        stop: stop rule of each choice, counted in simulated pushes; what was found until then is
-            driven. By default ``max_rollouts`` of the config.
+        stop: stop rule of each decision, counted in simulated pushes. What a time limit interrupts
+            goes on in the next step, while the robot stands (``max_pause`` of the config). By
+            default ``max_rollouts`` of the config.
         costs: terms that are added to the cost by which pushes are chosen.
         overrides: fields of the default config to change, in place of ``config``.
 
@@ -81,8 +84,10 @@ class GtspMpc(RearrangementPolicy):
         self._execution: PushExecution | None = None
         self._shown: Push | None = None
         self._searched: PushScene | None = None
+        self._unfinished: _Unfinished | None = None
         self._cache = RolloutCache()
         self._history = PushHistory()
+        self._delivered: IntArray = np.zeros(0, dtype=np.int64)
         self._left = -1
         self._rounds = 0
         self._retreats = 0
@@ -132,7 +137,8 @@ class GtspMpc(RearrangementPolicy):
 
     def _observe(self, world: World) -> PushScene:
         """Look at the scene, and notice what has been done since the last look."""
-        scene = PushScene(world, self.config, self._cache)
+        scene = PushScene(world, self.config, self._cache, delivered=self._delivered)
+        self._delivered = scene.movables.ids[scene.done]
         left = len(scene.left)
         if left != self._left:  # something was done, or has come back
             self._left = left
@@ -152,8 +158,27 @@ class GtspMpc(RearrangementPolicy):
             if self._searched is scene:  # one search a step is enough
                 return False
             self._searched = scene
+            searched = scene
+            unfinished = self._unfinished
+            if unfinished is not None:
+                if _stands_still(scene, unfinished.scene):
+                    searched = unfinished.scene  # the search goes on with what it has found
+                elif (
+                    unfinished.choice.first is not None
+                    and scene.world.time - unfinished.began > _SETTLING
+                ):
+                    self._unfinished = None
+                    return self._begin(scene, unfinished.choice)
             self._choosing = choose_push(
-                scene, self._history, self._executor, self.stop, self.costs
+                searched,
+                self._history,
+                self._executor,
+                self.stop,
+                self.costs,
+                last=self.plan,
+                now=scene.world.time,
+                collect=unfinished is not None
+                and scene.world.time - unfinished.began < _COLLECTING * self.config.max_pause,
             )
         choosing = self._choosing
         if not choosing.fits(scene):
@@ -162,7 +187,38 @@ class GtspMpc(RearrangementPolicy):
         if not choosing.call.ready(scene.world.time):
             return False
         self._choosing = None
-        return self._begin(scene, choosing.call.result())
+        best: PushChoice | None = choosing.call.result()
+        if best is not None and not choosing.ahead:
+            best = self._best_so_far(scene, choosing.scene, best)
+        return best is not None and self._begin(scene, best)
+
+    def _best_so_far(
+        self, scene: PushScene, searched: PushScene, choice: PushChoice
+    ) -> PushChoice | None:
+        """The choice to begin with; None if the robot stands while the search for a better goes on.
+
+        Args:
+            scene: as it is now.
+            searched: for which the choice was made.
+            choice: what has come of it.
+        """
+        before = self._unfinished
+        self._unfinished = None
+        if not choice.interrupted:
+            return choice
+        now = scene.world.time
+        began = now if before is None else before.began
+        if choice.first is None and before is not None and before.choice.first is not None:
+            choice = before.choice
+        late = searched.budget.out_of_time
+        pauses = choice.first is not None and late and now - began < self.config.max_pause
+        if pauses or choice.first is None:
+            self._unfinished = _Unfinished(searched, choice, began)
+        if not pauses:
+            return choice
+        self.graph = choice.graph
+        self.plan = choice.plan
+        return None
 
     def _approach_and_push(self, scene: PushScene) -> Twist | None:
         """The next command of the push in hand; None where there is none, or it has ended."""
@@ -195,7 +251,13 @@ class GtspMpc(RearrangementPolicy):
             expected = scene_after(scene, execution.push)
             if not expected.done.all():
                 self._choosing = choose_push(
-                    expected, self._history, self._executor, self.stop, self.costs, ahead=True
+                    expected,
+                    self._history,
+                    self._executor,
+                    self.stop,
+                    self.costs,
+                    ahead=True,
+                    last=self.plan,
                 )
 
     def _forget_choice(self) -> None:
@@ -227,6 +289,7 @@ class GtspMpc(RearrangementPolicy):
             self._recovery = lambda world, held: follower.command(
                 world.robot_pose, world.time, held
             )
+            self._unfinished = None
             self._cache = RolloutCache()  # that nothing was found is no longer true out there
             return True
         if choice.interrupted:  # the next search begins with what is known by now
@@ -241,6 +304,7 @@ class GtspMpc(RearrangementPolicy):
 
     def _tries_anew(self, scene: PushScene) -> bool:
         """Forget what was searched elsewhere, or tried when objects were farther away, or stop."""
+        self._unfinished = None
         if self._cache.is_from_elsewhere(scene.robot_cell):
             self._cache = RolloutCache()
             return True
@@ -273,6 +337,27 @@ class GtspMpc(RearrangementPolicy):
                 scene.world, distance, skip=self._retreats, looks=False, searches=False
             ).command
             self._retreats += 1
+
+
+@dataclass(frozen=True, eq=False)
+class _Unfinished:
+    """A decision that its stop rule has interrupted.
+
+    Args:
+        scene: for which it is made, with what was found so far.
+        choice: the best one so far.
+        began: when the first call began, by the clock of the world [s].
+    """
+
+    scene: PushScene
+    choice: PushChoice
+    began: float
+
+
+def _stands_still(one: PushScene, other: PushScene) -> bool:
+    """Return True if neither the robot nor an object has moved between two scenes."""
+    moved = np.abs(one.world.robot_pose - other.world.robot_pose).max()
+    return bool(moved <= _SAME_PLACE * one.size) and _alike(one, other)
 
 
 def _alike(one: PushScene, other: PushScene) -> bool:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from pushplan.geometry.grid import nearest_marked
 from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.done_places import done_places
 from pushplan.planners.rearrangement.rearrangement_config import SHIFTS
+from pushplan.planners.rearrangement.search_budget import SearchBudget
 from pushplan.world import ClearanceArea, Goal, Receptacle, RobotModel, StaticMap
 from pushplan.world.checks import BoolArray, FloatArray
 
@@ -23,6 +25,7 @@ _INSET = 1.05  # distance of an object from the edges of a receptacle when it is
 _MOST_KEPT = 20_000  # greatest number of lengths and paths that are kept
 _CELL = 0.125  # side of a cell [circumscribed radii of the robot]
 _MOST_CELLS = 160  # along the longer side of a map
+_ROWS = 8  # of cells that are worked out at once
 _BEYOND = 0.6  # how far beyond the middle of a receptacle a path goes [length up to it]
 _HALF_DEPTH = 0.85  # from the outline to the middle of an object, roughly [radii]
 _GOAL_CELLS = 0.75  # distance from where an object is done at which a cell counts as that [cells]
@@ -145,27 +148,52 @@ class PushCostToGo:
         self._low = low + 0.5 * (sides - self._step * np.array([cols - 1, rows - 1]))
         x = self._low[0] + self._step * np.arange(cols)
         y = self._low[1] + self._step * np.arange(rows)
-        middles = shapely.points(*np.meshgrid(x, y))
         walls = shapely.union_all([shapely.Polygon(part) for part in static.convex_parts])
-        open_cells = np.ones((rows, cols), dtype=np.bool_)
-        if not walls.is_empty:
-            shapely.prepare(walls)
-            open_cells = shapely.distance(walls, middles) > 0.5 * radius
-        pushable = core.pushable_moves(
-            np.stack(np.meshgrid(x, y), axis=2),
-            open_cells,
-            np.array(SHIFTS) * half_width,
-            float(robot.vertices[:, 0].max()) + slack + _HALF_DEPTH * radius,
-            footprint(robot, margin),
-            obstacles(static),
-        )
-        at_goal = open_cells & _is_goal(goal, radius, middles, self._step)
-        costs = np.zeros((rows, cols))
-        if at_goal.any():
-            seeds = np.flatnonzero(at_goal)
-            costs = core.push_costs(open_cells, pushable, seeds, self._step, drag_cost)
+        shapely.prepare(walls)
+        goals = _goal_shapes(goal, radius)
+        places = np.stack(np.meshgrid(x, y), axis=2)
+        shape = footprint(robot, margin)
+        among = obstacles(static)
+        shifts = np.array(SHIFTS) * half_width
+        distance = float(robot.vertices[:, 0].max()) + slack + _HALF_DEPTH * radius
+
+        def pieces() -> Iterator[tuple[BoolArray, BoolArray, BoolArray]]:
+            for begin in range(0, rows, _ROWS):
+                some = places[begin : begin + _ROWS]
+                middles = shapely.points(some)
+                is_open = np.ones(some.shape[:2], dtype=np.bool_)
+                if not walls.is_empty:
+                    is_open = shapely.distance(walls, middles) > 0.5 * radius
+                at_goal = is_open & (shapely.distance(goals, middles) <= _GOAL_CELLS * self._step)
+                fits = core.pushable_moves(some, is_open, shifts, distance, shape, among)
+                yield is_open, at_goal, fits
+
+        self._pieces = pieces()
+        self._made: list[tuple[BoolArray, BoolArray, BoolArray]] = []
+        self._drag_cost = drag_cost
+
+    def prepare(self, budget: SearchBudget) -> bool:
+        """Work the costs out row by row; False if the budget has ended that, to be gone on with."""
+        while not budget.is_over:
+            piece = next(self._pieces, None)
+            if piece is None:
+                return self._costs is not None
+            self._made.append(piece)
+        return False
+
+    @cached_property
+    def _costs(self) -> FloatArray:
+        """(rows, columns) [m]."""
+        is_open, at_goal, fits = zip(*self._made, *self._pieces, strict=True)
+        open_cells = np.concatenate(is_open)
+        seeds = np.flatnonzero(np.concatenate(at_goal))
+        costs = np.zeros(open_cells.shape)
+        if len(seeds):
+            pushable = np.concatenate(fits, axis=1)
+            costs = core.push_costs(open_cells, pushable, seeds, self._step, self._drag_cost)
         away, i, j = nearest_marked(np.isfinite(costs))
-        self._costs: FloatArray = costs[i, j] + drag_cost * self._step * away
+        found: FloatArray = costs[i, j] + self._drag_cost * self._step * away
+        return found
 
     def at(self, pose: FloatArray) -> float:
         """Cost from a pose (3,) of the object [m]."""
@@ -185,16 +213,15 @@ class PushCostToGo:
         return costs
 
 
-def _is_goal(goal: Goal, radius: float, middles: Any, step: float) -> BoolArray:
-    """(rows, cols) in which cells an object is done, or about to be."""
+def _goal_shapes(goal: Goal, radius: float) -> Any:
+    """The area in which an object is done, as a prepared shape."""
     places = done_places(goal, radius, 1.0)
     if places is None:
         assert isinstance(goal, Receptacle)
         places = [goal.polygon.mean(axis=0)[None]]
     shapes = shapely.union_all([shapely.MultiPoint(place).convex_hull for place in places])
     shapely.prepare(shapes)
-    out: BoolArray = shapely.distance(shapes, middles) <= _GOAL_CELLS * step
-    return out
+    return shapes
 
 
 push_cost_to_go = functools.lru_cache(maxsize=16)(PushCostToGo)

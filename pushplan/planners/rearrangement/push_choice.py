@@ -35,6 +35,8 @@ _ROBOT_OFF = 0.5
 _OBJECT_OFF = 0.2
 """Greatest distances from the predicted poses in a scene that a choice is still good for
 [circumscribed radii]."""
+_RECOVERY_S = 0.05
+"""Time that a path out of a tight place takes, roughly [s]."""
 _NEAREST = 2
 """For so many objects, the nearest ones, relocations are looked for at first."""
 
@@ -112,6 +114,9 @@ def choose_push(
     stop: Stop | None,
     costs: Sequence[PushCost] = (),
     ahead: bool = False,
+    last: Sequence[Push] = (),
+    now: float | None = None,
+    collect: bool = False,
 ) -> PendingChoice:
     """Ask for the best push, or else a recovery path.
 
@@ -122,6 +127,9 @@ def choose_push(
         stop: its stop rule; without one no more pushes than the config allows are simulated.
         costs: terms of a user, which are added to the cost of a push.
         ahead: the scene is still to come.
+        last: the pushes of the last plan, in order.
+        now: time of the world [s]; that of the scene by default.
+        collect: where a choice is known for the scene, only simulate further pushes.
     """
     history = copy.deepcopy(history)
     config = scene.config
@@ -131,17 +139,33 @@ def choose_push(
     def penalty(push: Push) -> float:
         return history.penalty(push, config) * size + sum(term(push) for term in terms)
 
+    def way_out() -> FloatArray | None:
+        return recovery_path(scene.world, 0.5 * MARGIN * size)
+
     def choose(rule: Stop | None) -> PushChoice:
         assert scene.cache is not None
         scene.cache.age()
         most = math.inf
         if wants_own_budget(rule):
             most = config.max_rollouts
-        scene.budget.start(rule, most)
-        choice = select_push(scene, penalty)
+        known: PushChoice | None = scene.progress.get("choice")
+        collects = collect and known is not None
+        scene.budget.start(rule, most, found=known is not None, collects=collects)
+        if known is not None and collects:
+            scene.progress["delivering"].fill(scene.budget)
+            if scene.budget.out_of_time:
+                return replace(known, interrupted=True)
+        if "no push" in scene.progress:
+            scene.known("recovery", way_out)
+        choice = select_push(scene, penalty, last)
+        if choice.first is not None:
+            scene.progress["choice"] = choice
         recovery = None
-        if choice.first is None:
-            recovery = recovery_path(scene.world, 0.5 * MARGIN * size)
+        if choice.first is None and not scene.budget.stopped:
+            if "recovery" in scene.progress or scene.budget.has_room(_RECOVERY_S):
+                recovery = scene.known("recovery", way_out)
+            else:
+                scene.progress["no push"] = True
         return replace(
             choice,
             recovery=recovery,
@@ -149,7 +173,8 @@ def choose_push(
             searches=scene.cache.searches,
         )
 
-    return PendingChoice(scene, executor.submit(choose, scene.world.time, stop), ahead)
+    began = scene.world.time if now is None else now
+    return PendingChoice(scene, executor.submit(choose, began, stop), ahead)
 
 
 def _checked(cost: PushCost, world: World, push: Push) -> float:
@@ -169,10 +194,14 @@ def scene_after(scene: PushScene, push: Push) -> PushScene:
     there = np.flatnonzero(after[:, 0] < 0.5 * core.REMOVED)
     movables = world.movables.select(there).moved_to(after[there])
     moved = replace(world, robot_pose=push.end, robot_twist=np.zeros(3), movables=movables)
-    return PushScene(moved, scene.config, scene.cache)
+    return PushScene(moved, scene.config, scene.cache, delivered=scene.delivered)
 
 
-def select_push(scene: PushScene, penalty: Callable[[Push], float] = lambda _: 0.0) -> PushChoice:
+def select_push(
+    scene: PushScene,
+    penalty: Callable[[Push], float] = lambda _: 0.0,
+    last: Sequence[Push] = (),
+) -> PushChoice:
     """Sequence anew: the pushes to make, and the first of them with the route to it.
 
     Where no push home can be carried out, those that end on the way count as well, and where none
@@ -182,47 +211,73 @@ def select_push(scene: PushScene, penalty: Callable[[Push], float] = lambda _: 0
     Args:
         scene: the scene.
         penalty: what to add to the cost of a push [m].
+        last: the pushes of the last plan, in order.
     """
-    choice = _select(scene, build_push_graph(scene, penalty), penalty)
+    choice = _select(scene, build_push_graph(scene, penalty), penalty, last)
+    while scene.budget.next_round():
+        better = _select(scene, build_push_graph(scene, penalty), penalty, choice.plan or last)
+        if better.first is not None or choice.first is None:
+            choice = better
     left = len(scene.left)
     for relocations, thorough in ((0, False), (min(_NEAREST, left), False), (left, True)):
         if choice.first is None and not scene.budget.is_used_up:
             if thorough:
-                scene = scene.on_finer_lattice()
+                if not scene.budget.has_room(scene.finer_lattice_s):
+                    break
+                scene = scene.known("finer", scene.on_finer_lattice)
             graph = build_push_graph(
                 scene, penalty, onward=True, relocations=relocations, thorough=thorough
             )
-            choice = _select(scene, graph, penalty)
+            choice = _select(scene, graph, penalty, last)
     return choice
 
 
-def _select(scene: PushScene, graph: PushGraph, penalty: Callable[[Push], float]) -> PushChoice:
+def _select(
+    scene: PushScene,
+    graph: PushGraph,
+    penalty: Callable[[Push], float],
+    last: Sequence[Push],
+) -> PushChoice:
     """The cheapest order, with its first push simulated.
 
     It is simulated on the cheapest path, and if that spoils the push around its object.
     """
     known: dict[int, SimulatedPush] = {}
-    around: dict[int, ApproachTree] = {}
+    budget = scene.budget
+    simulated: dict[int, tuple[Push, SimulatedPush | None]] = scene.known("simulated", dict)
 
     def simulated_cost(n: int) -> tuple[float, tuple[int, ...]] | None:
-        if scene.budget.is_used_up and any(math.isfinite(one.cost) for one in known.values()):
-            return None
         push = graph.pushes[n]
-        target = int(np.flatnonzero(scene.movables.ids == push.target)[0])
-        found = _simulated(scene, graph.approach, push, target)
-        if found is None or not math.isfinite(found.cost):
-            if target not in around:
-                around[target] = approach_tree(scene, target)
-            found = _simulated(scene, around[target], push, target) or found
+        if id(push) not in simulated:
+            if budget.is_used_up:
+                if budget.stopped or any(math.isfinite(one.cost) for one in known.values()):
+                    return None
+            found = _first_push(scene, graph.approach, push)
+            if budget.stopped and (found is None or not math.isfinite(found.cost)):
+                return None  # it may only be that there was no time for a route
+            simulated[id(push)] = push, found
+        found = simulated[id(push)][1]
         if found is None:
             return math.inf, ()
         known[n] = found
-        scene.budget.cost = min(scene.budget.cost, found.cost)
+        budget.cost = min(budget.cost, found.cost)
         return found.cost + penalty(push), found.push.delivers
 
-    order = sequence_pushes(graph, simulated_cost, scene.config.max_simulations)
+    order = sequence_pushes(
+        graph, simulated_cost, scene.config.max_simulations, budget.time_limit, last
+    )
     plan = tuple(graph.pushes[n] for n in order)
     return PushChoice(graph, plan, known[order[0]] if order else None)
+
+
+def _first_push(scene: PushScene, approach: ApproachTree, push: Push) -> SimulatedPush | None:
+    """A push with the route to it, which leads around its object where the cheapest one fails."""
+    target = int(np.flatnonzero(scene.movables.ids == push.target)[0])
+    found = _simulated(scene, approach, push, target)
+    if (found is None or not math.isfinite(found.cost)) and not scene.budget.stopped:
+        around = scene.known(("around", target), lambda: approach_tree(scene, target))
+        found = _simulated(scene, around, push, target) or found
+    return found
 
 
 def _simulated(

@@ -12,10 +12,11 @@ path.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from itertools import combinations, pairwise
+from functools import cached_property, partial
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,7 +28,11 @@ from pushplan.planners.rearrangement.approach import (
     arrivals_at,
     search_approaches,
 )
-from pushplan.planners.rearrangement.candidates import delivering_pushes, partial_pushes
+from pushplan.planners.rearrangement.candidates import (
+    PushPool,
+    delivering_pushes,
+    partial_pushes,
+)
 from pushplan.planners.rearrangement.push import Push
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.relocation import relocating_pushes
@@ -43,6 +48,7 @@ _MOST_APPROACHES = 150
 _SAME_END = 2.0
 _SAME_END_TURN = 0.8
 """Sides of the boxes of ends of pushes that share their approaches [cells, rad]."""
+_LONGER = 1.5  # length of an approach that is not searched [straight line]
 _UNREACHABLE = 5.0  # cost of getting to what cannot be got to later [diagonals of the map]
 
 
@@ -54,11 +60,34 @@ class GtspReduction:
         costs: (M, M) arcs between nodes, node 0 is the robot.
         clusters: nodes of each object, in order, and last that of the robot.
         pushes: (M,) index of the push that each node stands for, -1 for the robot.
+        chains: the nodes of each part of each push.
     """
 
     costs: FloatArray
     clusters: list[list[int]]
     pushes: list[int]
+    chains: list[list[int]]
+
+    def tour(self, order: Sequence[int]) -> list[int] | None:
+        """The closed tour that makes pushes in an order, each for what is left when it comes.
+
+        Returns:
+            Nodes; None if pushes are missing or may not follow each other.
+        """
+        chains: dict[int, list[list[int]]] = {}
+        for chain in sorted(self.chains, key=len, reverse=True):
+            chains.setdefault(self.pushes[chain[0]], []).append(chain)
+        owners = {node: c for c, nodes in enumerate(self.clusters) for node in nodes}
+        left = set(range(len(self.clusters) - 1))
+        found = [0]
+        for n in order:
+            for chain in chains.get(n, []):
+                served = {owners[node] for node in chain}
+                if served <= left:
+                    left -= served
+                    found += chain
+        drives = np.isfinite(self.costs[found, np.roll(found, -1)]).all()
+        return found if drives and not left else None
 
     def order(self, nodes: list[int]) -> list[int]:
         """The pushes along a closed tour over nodes, from the robot on."""
@@ -78,9 +107,7 @@ def reduce_to_gtsp(costs: FloatArray, masks: list[int], objects: int) -> GtspRed
         masks: what each push delivers, one bit an object.
         objects: how many objects there are.
     """
-    firsts = []
-    lasts = []
-    chains = []
+    chains: list[list[int]] = []
     clusters: list[list[int]] = [[] for _ in range(objects)]
     owners = [-1]
     count = 1
@@ -92,19 +119,19 @@ def reduce_to_gtsp(costs: FloatArray, masks: list[int], objects: int) -> GtspRed
             for node, b in zip(nodes, part, strict=True):
                 clusters[b].append(node)
             owners += [n] * len(part)
-            firsts.append(nodes[0])
-            lasts.append(nodes[-1])
-            chains += list(pairwise(nodes))
+            chains.append(nodes)
             count += len(part)
     out = np.full((count, count), np.inf)
+    firsts = [nodes[0] for nodes in chains]
+    lasts = [nodes[-1] for nodes in chains]
     which = np.array([owners[node] for node in firsts], dtype=np.int64)
     if len(which):
         out[np.ix_(lasts, firsts)] = costs[np.ix_(which, which)]
         out[0, firsts] = costs[-1, which]
         out[lasts, 0] = 0.0
-    for a, b in chains:
-        out[a, b] = 0.0
-    return GtspReduction(out, [*clusters, [0]], owners)
+    for nodes in chains:
+        out[nodes[:-1], nodes[1:]] = 0.0
+    return GtspReduction(out, [*clusters, [0]], owners, chains)
 
 
 def parts_of(mask: int) -> list[tuple[int, ...]]:
@@ -193,14 +220,18 @@ def build_push_graph(
             where they can be pushed home from are wanted too.
         thorough: look for ones that cost much more than the best one.
     """
-    approach = approach_tree(scene)
+    approach = scene.known("approach", lambda: approach_tree(scene))
     away = np.hypot(*(scene.poses[:, :2] - scene.world.robot_pose[:2]).T)
     objects = sorted(scene.left, key=lambda k: (float(away[k]), k))
-    pushes = delivering_pushes(scene, objects)
-    if onward:
-        pushes += [push for k in objects for push in partial_pushes(scene, k)]
+    budget = scene.budget
+    pool = scene.known("delivering", lambda: PushPool(delivering_pushes(scene, objects)))
+    pushes = pool.fill(budget)
+    for k in objects if onward else ():
+        if scene.push_cost_to_go(k).prepare(budget):
+            pool = scene.known(("partial", k), partial(_partial_pool, scene, k))
+            pushes += pool.fill(budget)
     for k in objects:
-        if not relocations or scene.budget.is_used_up:
+        if not relocations or budget.is_used_up:
             break
         found = relocating_pushes(scene, k, approach, thorough)
         pushes += found
@@ -221,6 +252,10 @@ def build_push_graph(
         if i not in delivered
     }
     return PushGraph(tuple(pushes), costs, approach, infeasible)
+
+
+def _partial_pool(scene: PushScene, k: int) -> PushPool:
+    return PushPool(partial_pushes(scene, k))
 
 
 def _best(scene: PushScene, pushes: Sequence[Push], row: FloatArray) -> list[int]:
@@ -244,7 +279,8 @@ def _between(scene: PushScene, pushes: Sequence[Push]) -> FloatArray:
     """(N, N) cost of the approach from the end of each push to the start of each other [m].
 
     What cannot be got to from there, as far as one can say now, is put off rather than ruled out:
-    otherwise one object would be enough for there to be no order at all.
+    otherwise one object would be enough for there to be no order at all. Where there is no time for
+    a search the straight line counts, longer as the approaches that were searched are.
     """
     grid = scene.coarse.grid
     ids = scene.movables.ids
@@ -252,7 +288,12 @@ def _between(scene: PushScene, pushes: Sequence[Push]) -> FloatArray:
     far = _UNREACHABLE * float(np.hypot(*(bounds[2:] - bounds[:2])))
     arrivals = arrivals_at(grid, pushes)
     out = np.full((len(pushes), len(pushes)), far)
-    known: dict[tuple[object, ...], FloatArray] = {}
+    known: dict[tuple[object, ...], ApproachTree] = {}
+    until = arrivals.nodes
+    if scene.budget.seconds < math.inf:  # pushes that are found later need the rest as well
+        until = np.zeros(0, dtype=np.int64)
+        known = scene.known("between", dict)
+    late: list[int] = []
     step = _SAME_END * grid.step
     for n, push in enumerate(pushes):
         key = (
@@ -261,12 +302,24 @@ def _between(scene: PushScene, pushes: Sequence[Push]) -> FloatArray:
             round(float(push.end[2]) / _SAME_END_TURN),
         )
         if key not in known:
-            if len(known) == _MOST_APPROACHES or scene.budget.is_over:
+            if scene.budget.no_more_approaches:
+                late.append(n)
+                continue
+            if len(known) == _MOST_APPROACHES:
                 continue
             weights = scene.config.later_fraction * scene.contact_weights
             weights[np.isin(ids, push.delivers)] = 0.0
-            found = search_approaches(scene, scene.coarse, push.end, weights, arrivals.nodes)
-            known[key] = core.least_costs(found.costs, *arrivals)
-        out[n] = np.minimum(known[key], far)
+            known[key] = search_approaches(scene, scene.coarse, push.end, weights, until)
+        out[n] = np.minimum(core.least_costs(known[key].costs, *arrivals), far)
+    if late:
+        ends = np.array([push.end[:2] for push in pushes])
+        starts = np.array([push.start[:2] for push in pushes])
+        straight = np.hypot(*(ends[:, None] - starts).transpose(2, 0, 1))
+        searched = np.delete(out, late, axis=0)
+        reached = searched < far
+        longer = _LONGER
+        if reached.any():
+            longer = searched[reached].sum() / np.delete(straight, late, axis=0)[reached].sum()
+        out[late] = longer * straight[late]
     np.fill_diagonal(out, np.inf)
     return out

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from pushplan.core import rearrangement as core
 from pushplan.gtsp import solve_gtsp
+from pushplan.planners.rearrangement.push import Push, signature
 from pushplan.planners.rearrangement.push_graph import PushGraph
-from pushplan.world import MaxIterations
+from pushplan.world import MaxIterations, Stop
 from pushplan.world.checks import FloatArray, IntArray
 
 
@@ -26,11 +27,23 @@ def _order_after(
     return order
 
 
-def push_order(graph: PushGraph, iterations: int = 300) -> tuple[list[int], float]:
+def push_order(
+    graph: PushGraph,
+    iterations: int = 300,
+    *,
+    stop: Stop | None = None,
+    initial: Sequence[int] = (),
+) -> tuple[list[int], float]:
     """The cheapest order of pushes that is found: their indices, and its cost [m].
 
     Objects without a push are left out. Up to `core.MAX_EXACT` objects the order is the
     cheapest there is; beyond, `solve_gtsp` searches for one on the reduced problem.
+
+    Args:
+        graph: the pushes and their costs.
+        iterations: rounds of that search.
+        stop: ends it, too.
+        initial: an order that it begins with, if that is one.
     """
     count = len(graph.objects)
     if not count:
@@ -40,7 +53,13 @@ def push_order(graph: PushGraph, iterations: int = 300) -> tuple[list[int], floa
         start = len(graph.pushes)
         return _order_after(following, graph.masks, 0, start, []), float(best[0, start])
     reduced = graph.to_gtsp()
-    tour = solve_gtsp(reduced.costs, reduced.clusters, stop=MaxIterations(iterations))
+    rule: Stop = MaxIterations(iterations)
+    tour = solve_gtsp(
+        reduced.costs,
+        reduced.clusters,
+        stop=rule if stop is None else rule | stop,
+        initial=reduced.tour(initial),
+    )
     if not tour.status.has_tour:
         return [], math.inf
     return reduced.order([int(node) for node in tour.nodes]), float(tour.cost)
@@ -51,7 +70,13 @@ SimulatedCost = Callable[[int], tuple[float, tuple[int, ...]] | None]
 None where the search has to return with what is simulated by now."""
 
 
-def sequence_pushes(graph: PushGraph, simulated_cost: SimulatedCost, most: int) -> list[int]:
+def sequence_pushes(
+    graph: PushGraph,
+    simulated_cost: SimulatedCost,
+    most: int,
+    stop: Stop | None = None,
+    last: Sequence[Push] = (),
+) -> list[int]:
     """The order of pushes, with the first one simulated.
 
     The graph knows approaches roughly. The push that the cheapest order begins with is
@@ -61,12 +86,14 @@ def sequence_pushes(graph: PushGraph, simulated_cost: SimulatedCost, most: int) 
         graph: the pushes and their costs.
         simulated_cost: simulates a push.
         most: how many pushes are simulated at most.
+        stop: a time limit; None for none.
+        last: the pushes of the last plan, in order, from which a search with a time limit begins.
     """
     count = len(graph.objects)
     if not count:
         return []
     if count > core.MAX_EXACT:
-        return _by_tours(graph, simulated_cost, most)
+        return _by_tours(graph, simulated_cost, most, stop, last)
     best, following = core.cost_to_go(graph.costs, graph.masks, count)
     rest = np.array([best[graph.masks[n], n] for n in range(len(graph.masks))])
     guess = graph.costs[-1] + rest
@@ -91,12 +118,23 @@ def sequence_pushes(graph: PushGraph, simulated_cost: SimulatedCost, most: int) 
     return _order_after(following, graph.masks, mask, chosen, [chosen])
 
 
-def _by_tours(graph: PushGraph, simulated_cost: SimulatedCost, most: int) -> list[int]:
+def _by_tours(
+    graph: PushGraph,
+    simulated_cost: SimulatedCost,
+    most: int,
+    stop: Stop | None,
+    last: Sequence[Push],
+) -> list[int]:
     """As `sequence_pushes`, with a tour anew for every push that is simulated."""
+    initial: list[int] = []
+    if stop is not None:
+        places = {signature(push): n for n, push in enumerate(graph.pushes)}
+        initial = [places[key] for key in map(signature, last) if key in places]
+        initial += np.argsort(graph.costs[-1], kind="stable").tolist()
     costs: FloatArray = graph.costs.copy()
     known: dict[int, float] = {}
     for _ in range(most):
-        order, total = push_order(replace(graph, costs=costs))
+        order, total = push_order(replace(graph, costs=costs), stop=stop, initial=initial)
         if not order or not math.isfinite(total):
             break
         if order[0] in known:
@@ -106,6 +144,10 @@ def _by_tours(graph: PushGraph, simulated_cost: SimulatedCost, most: int) -> lis
             costs[-1, [n for n in range(costs.shape[1]) if n not in known]] = np.inf
         else:
             known[order[0]] = costs[-1, order[0]] = found[0]
+        if stop is not None:
+            initial = order
+            if found is None or math.isinf(found[0]):
+                initial = [*order[1:], order[0]]
     rest = [n for n in known if math.isfinite(known[n])]
     rest.sort(key=lambda n: (known[n] / len(graph.pushes[n].serves), n))
     return rest[:1]

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import copy
 import math
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -30,7 +31,9 @@ from pushplan.planners.rearrangement.rearrangement_config import RearrangementCo
 from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.planners.rearrangement.search_budget import SearchBudget
 from pushplan.world import Movables, World
-from pushplan.world.checks import BoolArray, FloatArray
+from pushplan.world.checks import BoolArray, FloatArray, IntArray
+
+T = TypeVar("T")
 
 # Lengths are in circumscribed radii of the robot.
 _GOAL_SLACK = 0.012
@@ -60,6 +63,8 @@ MARGIN = 0.03
 """Distance that approaches keep from what is static."""
 _LEAST_MARGIN = 0.3 * MARGIN
 """Distance from what is static that the robot keeps wherever it is placed."""
+_POSE_S = 6e-7
+"""Time that a pose of the lattice takes [s]."""
 _TURN_COST = 0.03
 """Cost of a turn by one radian on the spot, so that needless ones are left out."""
 
@@ -79,12 +84,15 @@ class PushScene:
         config: settings.
         cache: what is known from the last scene.
         budget: of the decision that is made for it; endless by default.
+        delivered: ids of objects that were done before; with noise they are so until they are
+            surely not.
     """
 
     world: World
     config: RearrangementConfig
     cache: RolloutCache | None = None
     budget: SearchBudget = field(default_factory=SearchBudget)
+    delivered: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def __post_init__(self) -> None:
         check_pusher(self.world)
@@ -92,8 +100,28 @@ class PushScene:
     def _changed(self, **values: Any) -> PushScene:
         """The same with other fields, or with other values of what is worked out from them."""
         other = copy.copy(self)
+        other.__dict__.pop("progress", None)
         other.__dict__.update(values)
         return other
+
+    @cached_property
+    def progress(self) -> dict[Hashable, Any]:
+        """Results of decisions for this scene; one that was interrupted is gone on with."""
+        return {}
+
+    def known(self, key: Hashable, make: Callable[[], T]) -> T:
+        """The result of `make`, made once for the scene."""
+        if key not in self.progress:
+            self.progress[key] = make()
+        found: T = self.progress[key]
+        return found
+
+    @property
+    def finer_lattice_s(self) -> float:
+        """Time that it takes to make that lattice and to search it, roughly [s]."""
+        if "finer" in self.progress:
+            return 0.0
+        return _POSE_S * 4.0 * self.fine.grid.blocked.size
 
     def on_finer_lattice(self) -> PushScene:
         """The same with approaches on half the cells, that keep little distance from walls."""
@@ -109,12 +137,12 @@ class PushScene:
             )
         )
 
-    def with_objects_at(self, poses: FloatArray) -> PushScene:
+    def with_objects_at(self, poses: FloatArray, cache: RolloutCache | None = None) -> PushScene:
         """The same with the objects at poses (K, 3), as far as rolling out pushes goes.
 
         The world, and with it where the robot is, stays as it is.
         """
-        moved = self._changed(poses=np.ascontiguousarray(poses), cache=None)
+        moved = self._changed(poses=np.ascontiguousarray(poses), cache=cache)
         for name in ("done", "remaining_now", "fine", "coarse", "starts"):
             moved.__dict__.pop(name, None)
         return moved
@@ -178,12 +206,20 @@ class PushScene:
 
     def are_done(self, poses: FloatArray) -> BoolArray:
         """(K,) whether objects at poses (K, 3) are where they belong."""
-        return core.all_done(poses, self.bodies, self.object_goal)
+        done: BoolArray = core.all_done(poses, self.bodies, self.object_goal)
+        if self.config.position_noise > 0.0 and len(self.delivered):
+            stays = core.all_done(poses, self.bodies, self._goal_with(0.0))
+            done |= stays & np.isin(self.movables.ids, self.delivered)
+        return done
 
     @cached_property
     def object_goal(self) -> core.ObjectGoal:
         """When objects are done."""
-        slack = _GOAL_SLACK * self.size + 2.0 * self.config.position_noise
+        return self._goal_with(2.0 * self.config.position_noise)
+
+    def _goal_with(self, noise: float) -> core.ObjectGoal:
+        """When objects are done that have to be farther from the goal's edge by a noise [m]."""
+        slack = _GOAL_SLACK * self.size + noise
         return make_object_goal(self.world.goal, self.world.static, slack)
 
     @cached_property

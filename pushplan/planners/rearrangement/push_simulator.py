@@ -34,6 +34,7 @@ class PushAttempt:
         gain: of the pushing controller.
         friction: coefficient between robot and objects; that of the config by default.
         relocates: only the end counts, whatever is done then.
+        least: length that a push home has at least, roughly [m].
     """
 
     start: FloatArray
@@ -45,6 +46,7 @@ class PushAttempt:
     gain: float = 1.5
     friction: float | None = None
     relocates: bool = False
+    least: float = 0.0
 
 
 def simulate(

@@ -10,6 +10,7 @@ from pushplan.core import rearrangement as core
 from pushplan.planners.rearrangement.candidates import attempts
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.push_simulator import PushAttempt, end_of, simulate
+from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.world.checks import FloatArray
 
 _ADVANCE = 0.6
@@ -48,7 +49,13 @@ def can_be_pushed(scene: PushScene, k: int, horizon: float) -> bool:
     )
 
 
-def failing_margins(scene: PushScene, k: int, poses: FloatArray, horizon: float) -> int:
+def failing_margins(
+    scene: PushScene,
+    k: int,
+    poses: FloatArray,
+    horizon: float,
+    cache: RolloutCache | None = None,
+) -> int:
     """Count the margins that a push of an object home does not tolerate.
 
     Args:
@@ -56,6 +63,7 @@ def failing_margins(scene: PushScene, k: int, poses: FloatArray, horizon: float)
         k: index of the object.
         poses: (K, 3) where the objects are to be pushed from.
         horizon: see `can_be_pushed`.
+        cache: rollouts of a count that was interrupted.
     """
     units = np.array([scene.size, scene.size, 1.0])
 
@@ -63,7 +71,7 @@ def failing_margins(scene: PushScene, k: int, poses: FloatArray, horizon: float)
         displaced = np.array(poses)
         if displaced[k, 0] < 0.5 * core.REMOVED:
             displaced[k] += error * units
-        after = scene.with_objects_at(displaced)
+        after = scene.with_objects_at(displaced, cache)
         return bool(after.done[k]) or can_be_pushed(after, k, horizon)
 
     if not delivers(np.zeros(3)):

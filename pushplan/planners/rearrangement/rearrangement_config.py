@@ -93,6 +93,8 @@ class RearrangementConfig(CheckedFields):
         max_rollouts: after how many simulated pushes a choice is made among those that are known,
             unless a stop rule is given; searches for relocations have limits of their own.
         max_searches: how many objects relocations are searched for before one is chosen.
+        max_pause: for how long the robot stands where a time limit has interrupted a choice, while
+            the search for a better push goes on in the next steps [s].
         response: time in which an error of heading or place is driven off [s]; longer than the
             robot's delay.
         mpc: a push of one object along its path is driven by `PushingMpc`; else by the
@@ -121,6 +123,7 @@ class RearrangementConfig(CheckedFields):
     max_simulations: Annotated[int, Limits(1, 1000)] = 30
     max_rollouts: PositiveInt = 1000
     max_searches: PositiveInt = 6
+    max_pause: NonNegativeFloat = 3.0
     response: Annotated[float, Limits(0.0, 1e3, open_low=True)] = 0.2
     mpc: bool = True
     max_failures: PositiveInt = 3

@@ -45,9 +45,20 @@ def relocating_pushes(
         if found is None and cache.searches >= scene.config.max_searches:
             return []
     if found is None:
-        found = RelocationSearch(scene, k, approach, thorough).run()
-        if cache is not None and not scene.budget.is_over:
+        if not scene.push_cost_to_go(k).prepare(scene.budget):
+            return []
+        search = scene.known(
+            ("relocations", k, thorough), lambda: RelocationSearch(scene, k, approach, thorough)
+        )
+        found = search.run()
+        if search.interrupted and scene.budget.stopped:  # the next decision goes on with it
+            return []
+        if cache is not None and not search.interrupted:
             cache.keep_relocations(int(movables.ids[k]), asked, found)
+    key = "relocating", k, thorough
+    known, pushes = scene.progress.get(key, (None, []))
+    if known is found:
+        return list(pushes)
     pushes = []
     for path, extra, moved in found:
         poses = scene.poses.copy()
@@ -55,4 +66,5 @@ def relocating_pushes(
             poses[movables.ids == number] = pose
         for push in simulate_primitive(scene, path, k, poses):
             pushes.append(replace(push, cost=push.cost + extra))
-    return pushes
+    scene.progress[key] = found, pushes
+    return list(pushes)

@@ -29,7 +29,7 @@ from pushplan.planners.rearrangement.candidates import GAIN
 from pushplan.planners.rearrangement.push_scene import PushScene, pose_distance
 from pushplan.planners.rearrangement.push_starts import initial_heading
 from pushplan.planners.rearrangement.pushability import MARGINS, can_be_pushed, failing_margins
-from pushplan.planners.rearrangement.rollout_cache import Primitive
+from pushplan.planners.rearrangement.rollout_cache import Primitive, RolloutCache
 from pushplan.world.checks import FloatArray
 
 _Cell = tuple[float, ...]
@@ -101,6 +101,9 @@ class RelocationSearch:
         k: index of the object.
         approach: from where the robot is.
         thorough: look for drives that cost much more than the best one too.
+
+    Attributes:
+        interrupted: the budget has ended the search, which may be gone on with.
     """
 
     def __init__(self, scene: PushScene, k: int, approach: ApproachTree, thorough: bool) -> None:
@@ -130,52 +133,42 @@ class RelocationSearch:
         self._states: list[_State] = []
         self._failing: dict[_Cell, int] = {}
         """Number of the margins that a push home from a place does not tolerate, by place."""
+        self._now = float(self._rest(scene.poses[[k]])[0])
+        self._horizon_known = False
+        self._starts = itertools.chain(self._behind(), scene.starts.around(k))
+        self._best = math.inf
+        self._expansions = 0
+        self._sides = Counter[_Cell]()
+        self._alike = Counter[_Cell]()
+        self._interrupted_rollouts = RolloutCache()
+        self.interrupted = True
 
     def run(self) -> list[Primitive]:
-        """Drives, each with the cost of what it leaves to be done [m]."""
+        """Go on with the search; drives, each with the cost of what it leaves to be done [m]."""
         scene = self._scene
-        k = self._k
-        scene.budget.start_part()
-        if can_be_pushed(scene, k, self._horizon):  # but not as far as home
-            self._horizon = scene.longest
-        now = float(self._rest(scene.poses[[k]])[0])
-        for start in itertools.chain(self._behind(), scene.starts.around(k)):
-            nodes, extra = arrival_poses(scene.fine.grid, start)
-            away = float((self._approach.costs[nodes] + extra).min(initial=math.inf))
-            if math.isfinite(away):
-                self._put(_State(None, start[None], scene.poses, 0, away, now))
         most = len(MARGINS)
-        best = math.inf
-        expansions = 0
-        sides = Counter[_Cell]()
-        alike = Counter[_Cell]()
-        while self._open and expansions < _EXPANSIONS and sides.total() < _ENOUGH_MARGINS:
+        scene.budget.start_part()
+        self.interrupted = not self._begin()
+        while (
+            not self.interrupted
+            and self._open
+            and self._expansions < _EXPANSIONS
+            and self._sides.total() < _ENOUGH_MARGINS
+        ):
             if scene.budget.part_is_over:
+                self.interrupted = scene.budget.is_over
                 break
-            state = heapq.heappop(self._open)[2]
-            if state.cost > best + self._slack:
+            entry = heapq.heappop(self._open)
+            if entry[2].cost > self._best + self._slack:
+                heapq.heappush(self._open, entry)
                 break
-            if self._thorough and not state.depth:
-                arrived = self._arrived(state)
-                if arrived is None:
-                    continue
-                state = arrived
-            if state.depth:
-                if pose_distance(state.poses[k], scene.poses[k], scene.size) < _LEAST_MOVE:
-                    continue
-                side = self._side(state)
-                place = self._place(state)
-                if sides[side] < most and place not in self._failing:
-                    self._failing[place] = failing_margins(scene, k, state.poses, self._horizon)
-                stands = most - self._failing.get(place, most)
-                sides[side] = max(sides[side], stands)
-                if stands:
-                    best = min(best, state.cost + (most - stands) * scene.size)
-                if stands or state.depth == _DEPTH or alike[place] >= _MOST_ALIKE:
-                    continue
-                alike[place] += 1
-            expansions += state.depth > 0
-            self._expand(state)
+            self._look_at(entry[2])
+            if scene.budget.is_over:
+                self.interrupted = True
+                heapq.heappush(self._open, entry)  # some of it may have been left out
+        if self.interrupted and scene.budget.stopped:  # no time to choose among what is found
+            return []
+        now = self._now
         found = [
             (self._failing[self._place(state)] * scene.size, state)
             for state in self._states
@@ -186,11 +179,63 @@ class RelocationSearch:
             gain = GAIN * (_LITTLE_GAIN if self._thorough else 1.0)
             shortest = scene.object_paths.remaining
             found += [
-                (state.rest - float(shortest(state.poses[[k]])[0]) + 2.0 * scene.size, state)
+                (state.rest - float(shortest(state.poses[[self._k]])[0]) + 2.0 * scene.size, state)
                 for state in self._states
                 if state.rest < now - gain * scene.size
             ]
         return self._from_all_sides(found)
+
+    def _begin(self) -> bool:
+        """Note the places to begin in; False if the budget has ended that."""
+        scene = self._scene
+        if not self._horizon_known:
+            if can_be_pushed(scene, self._k, self._horizon):  # but not as far as home
+                self._horizon = scene.longest
+            elif scene.budget.is_over:
+                return False
+            self._horizon_known = True
+        for start in self._starts:
+            nodes, extra = arrival_poses(scene.fine.grid, start)
+            away = float((self._approach.costs[nodes] + extra).min(initial=math.inf))
+            if math.isfinite(away):
+                self._put(_State(None, start[None], scene.poses, 0, away, self._now))
+            if scene.budget.is_over:
+                return False
+        return True
+
+    def _look_at(self, state: _State) -> None:
+        """See whether a state helps, and drive on from it if not."""
+        scene = self._scene
+        k = self._k
+        most = len(MARGINS)
+        if self._thorough and not state.depth:
+            arrived = self._arrived(state)
+            if arrived is None:
+                return
+            state = arrived
+        if state.depth:
+            if pose_distance(state.poses[k], scene.poses[k], scene.size) < _LEAST_MOVE:
+                return
+            side = self._side(state)
+            place = self._place(state)
+            if self._sides[side] < most and place not in self._failing:
+                cache = None
+                if scene.budget.has_rule:
+                    cache = self._interrupted_rollouts
+                failing = failing_margins(scene, k, state.poses, self._horizon, cache)
+                if scene.budget.is_over:
+                    return
+                self._interrupted_rollouts = RolloutCache()
+                self._failing[place] = failing
+            stands = most - self._failing.get(place, most)
+            self._sides[side] = max(self._sides[side], stands)
+            if stands:
+                self._best = min(self._best, state.cost + (most - stands) * scene.size)
+            if stands or state.depth == _DEPTH or self._alike[place] >= _MOST_ALIKE:
+                return
+            self._alike[place] += 1
+        self._expansions += state.depth > 0
+        self._expand(state)
 
     def _put(self, state: _State) -> None:
         heapq.heappush(self._open, (state.cost, len(self._states), state))

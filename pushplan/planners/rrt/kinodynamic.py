@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pushplan.interaction import InteractionModel, QuasiStatic
-from pushplan.motion.dubins_warm_start import is_far, warm_start
+from pushplan.motion.dubins_warm_start import is_far
+from pushplan.motion.local_windows import warm_start
 from pushplan.motion.path_improver import Candidate, PathImprover
-from pushplan.motion.path_search_config import LEAST_GAIN, PathSearchConfig
+from pushplan.motion.path_search_config import PathSearchConfig
 from pushplan.motion.random_tree.tree_paths import TreePaths
 from pushplan.motion.speed_profile import turning_radius
 from pushplan.world import PlanResult, PlanStatus, Stop, World
@@ -97,8 +98,5 @@ def _one_round(improver: PathImprover, trees: TreePaths) -> None:
         improver.shortcut(candidate)
         if cheaper is None or candidate.cost < cheaper.cost:
             cheaper = candidate
-    while cheaper is not None and not improver.stopped():
-        before = cheaper.cost
-        improver.shortcut(cheaper)
-        if cheaper.cost > (1.0 - LEAST_GAIN) * before:
-            return
+    if cheaper is not None:
+        improver.work_out(cheaper)

@@ -53,7 +53,7 @@ class ShipLatticeCall:
         self.interaction = interaction
         self.world = world = call.world
         check_turns(world.robot)
-        self.goal = world.navigation_goal
+        self.goal = world.place_goal
         self.size = world.robot.circumscribed_radius
         self.iterations = self.expanded = self.shortcuts = 0
         self.lattice_cost = math.inf

@@ -21,7 +21,7 @@ from pushplan.world.convex_shapes import (
     listed_corners,
     shapes_of,
 )
-from pushplan.world.goals import ClearanceArea, Goal, GoalDisc, GoalLine, Receptacle
+from pushplan.world.goals import ClearanceArea, Goal, GoalDisc, GoalLine, GoalPose, Receptacle
 from pushplan.world.movables import Movables
 from pushplan.world.robot import RobotModel
 from pushplan.world.scene import World
@@ -48,6 +48,7 @@ _LEFT_OUT = {
 }
 """Values that are not written."""
 _GOALS: dict[str, tuple[type[Any], tuple[str, ...]]] = {
+    "pose": (GoalPose, ("center", "radius", "heading", "heading_tolerance")),
     "disc": (GoalDisc, ("center", "radius")),
     "line": (GoalLine, ("point", "normal")),
     "receptacle": (Receptacle, ("polygon",)),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import time
 import weakref
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from pushplan.world import (
     Deadline,
     GoalDisc,
     GoalLine,
+    GoalPose,
     InvalidInputError,
     MaxIterations,
     Movables,
@@ -93,6 +95,17 @@ def test_plans_open_the_way_and_touch_no_wall(layout: str) -> None:
     assert found.stats.detail["openings"] == len(boxes)
     assert (found.plan.speeds < 0.0).any()  # backs off
     assert digest(found.plan) == digest(plan(world, straight_iterations=0).plan)  # type: ignore[arg-type]
+
+
+def test_a_plan_that_opens_the_way_ends_at_a_pose() -> None:
+    world, boxes = start("one_box")
+    place = world.navigation_goal.center  # type: ignore[union-attr]
+    world = replace(world, goal=GoalPose(place, 0.02, 2.0, 0.05))
+    found = plan(world, straight_iterations=0)
+    assert found.plan is not None
+    assert found.stats.detail["openings"] == len(boxes)
+    assert world.navigation_goal.reached_by(found.plan.poses[-1])
+    assert keeps_from_walls(found.plan, world)
 
 
 @pytest.mark.parametrize("margin", [0.0, 0.15])

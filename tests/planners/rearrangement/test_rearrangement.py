@@ -252,7 +252,7 @@ def test_a_box_at_a_wall_is_relocated():
 
 def test_a_relocation_that_leaves_its_object_behind_is_none():
     here = scene([(0.0, 0.5, 0.4)])
-    push = next(partial_pushes(here, 0))
+    push = next(push for _, pushes in partial_pushes(here, 0) for push in pushes)
     [again] = resimulate(here, push, push.start)
     assert np.array_equal(again.object_poses, push.object_poses)
     aside = here.poses + np.array([0.0, 3.0 * here.size, 0.0])

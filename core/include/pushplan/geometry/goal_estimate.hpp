@@ -27,16 +27,17 @@ class CoveredSides {
   /// The cell of a point, the nearest of a point outside.
   Index cell_of(Vec2 p) const;
   Vec2 centre(Index cell) const;  // [m]
-  /// True if the side between two neighbouring cells is covered.
-  bool covered(Index cell, Index neighbour) const;
+  /// True if one move leads to the neighbour in a direction, of eight from x on to the left.
+  bool leads(Index cell, int direction) const {
+    return ((moves_[static_cast<std::size_t>(cell)] >> (direction & 7)) & 1) != 0;
+  }
 
  private:
   Vec2 origin_;
   double cell_;
   Index rows_;
   Index columns_;
-  std::vector<char> left_;   // (rows * columns,) whether that side of a cell is covered
-  std::vector<char> below_;  // and the one towards lower y
+  std::vector<std::uint8_t> moves_;  // (rows * columns,) a bit for each direction
 };
 
 /// Estimates for paths from places around one start to a goal. The sides have to outlive it.
@@ -49,13 +50,24 @@ class GoalEstimate {
 
   GoalEstimate(const CoveredSides& cells, const Regions& regions, Vec2 start);
 
+  /// Looks at so many cells more, by A* from the goal towards the start; true when all is known.
+  bool run(Index cells);
   /// The length of the way from a place [m], infinite where there is none.
   double from(Vec2 p) const;
 
  private:
+  std::int32_t to_start(Index cell) const;  // free distance [fifths of a cell]
+  void spread(Index cell);                  // makes known what moves from it lead to
+
   const CoveredSides& cells_;
-  std::vector<std::int32_t> distances_;  // of the cells [fifths of a cell]
-  std::int32_t rest_;                    // of cells that were not reached, at least
+  Index wanted_;                             // the start's cell
+  std::vector<std::int32_t> distances_;      // of the cells to the goal [fifths of a cell]
+  std::vector<Index> goals_;                 // cells of the goal, the farthest from the start first
+  std::vector<std::vector<Index>> buckets_;  // cells by the length of a way through them
+  std::int32_t now_ = 0;                     // the least such length
+  std::int32_t empty_;                       // buckets in a row
+  std::int32_t end_;                         // lengths beyond which nothing matters
+  std::int32_t rest_;                        // lengths through cells that are not known, at least
 };
 
 }  // namespace pushplan

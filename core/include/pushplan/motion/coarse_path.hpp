@@ -22,8 +22,8 @@ struct Surcharge {
   std::span<const double> weight;  // (K,) extra cost per metre at the polygon
 };
 
-/// Writes the extra cost per metre of each cell. `within` are the cells that each polygon reaches.
-void fill_cell_weights(ArrayView<double, 2> extra, const Cells& cells, const Polygons& polygons,
+/// Adds what polygons add to the cost per metre of each cell. `within` are the cells that each polygon reaches.
+void add_cell_weights(ArrayView<double, 2> extra, const Cells& cells, const Polygons& polygons,
                        std::span<const CellBox> within, const Surcharge& surcharge);
 
 }  // namespace pushplan

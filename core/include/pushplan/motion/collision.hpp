@@ -24,6 +24,7 @@ struct ConvexObstacles {
   Box bounds;                   // the workspace; a pose outside is not free
 
   Index count() const { return static_cast<Index>(boxes.size()); }
+  Index group_count() const { return static_cast<Index>(groups.size()); }
 };
 
 /// True if a disc comes closer to an obstacle than its radius [m].
@@ -49,10 +50,13 @@ class CollisionChecker {
 
  private:
   bool overlaps(Polygon obstacle) const;
+  /// True if the footprint overlaps one of a group; `placed` says whether its corners are there.
+  bool touches(const Pose& pose, Index group, bool& placed);
 
   Footprint footprint_;
   ConvexObstacles obstacles_;
   std::vector<Vec2> corners_;  // of the footprint in the world frame
+  std::vector<Index> near_;    // groups that some poses in a row may reach
 };
 
 }  // namespace pushplan

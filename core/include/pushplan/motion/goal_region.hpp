@@ -1,8 +1,9 @@
-// The goal of a robot: a disc, or everything beyond a line.
+// The goal of a robot: a disc, in which it may have to face a heading, or everything beyond a line.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "pushplan/geometry/pose.hpp"
 
@@ -15,6 +16,10 @@ struct GoalRegion {
   Vec2 point;           // centre of the disc, or a point of the line [m]
   Vec2 normal{};        // of a line, unit, towards the goal
   double radius = 0.0;  // of a disc [m]
+  double heading = std::numeric_limits<double>::quiet_NaN();  // to face in a disc [rad], if any
+  bool turns = false;  // paths turn to it on the spot; else they curve into it
+
+  bool has_heading() const { return !std::isnan(heading); }
 
   bool contains(Vec2 p) const {
     const double dx = p.x - point.x;

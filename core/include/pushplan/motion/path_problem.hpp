@@ -35,7 +35,8 @@ struct SweptPath {
   PathBuffer buffer() const { return {poses, curvatures}; }
 };
 
-/// Lays the poses of arcs into a path, up to the goal. Returns their number, 0 if there is no room.
+/// Lays the poses of arcs into a path, up to the goal, but all of them where that has a heading.
+/// Returns their number, 0 if there is no room.
 Index lay_out(const Pose& start, std::span<const Arc> arcs, const SweptPath& path,
               const PathProblem& problem);
 

@@ -17,6 +17,7 @@ constexpr double kSureTurn = 170.0 * (kPi / 180.0);  // up to here a turn is mad
 constexpr double kLittleTurn = 0.6;  // a turn by less is not made the longer way [rad]
 constexpr double kTightCost = 25.0;  // of driving on where the robot begins nearer to something
                                      // static than it should be
+constexpr double kRounding = 1.0 + 1e-12;  // on limits, so that sums in another order stay below
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
@@ -60,8 +61,9 @@ RouteSearch::Overlap RouteSearch::overlap(const Pose& pose) {
   return all;
 }
 
-/// Cost of a straight motion between two poses, or of a turn on the spot; infinite at a wall.
-double RouteSearch::motion(const Pose& here, const Pose& there, double turn) {
+/// Cost of a straight motion between two poses, or of a turn on the spot; infinite at a wall, and
+/// where `spent` and the cost so far reach the limit.
+double RouteSearch::motion(const Pose& here, const Pose& there, double turn, Limit limit) {
   const double length = std::hypot(there.x - here.x, there.y - here.y);
   const double angle = std::abs(turn);
   const Index steps = std::max<Index>(
@@ -72,6 +74,7 @@ double RouteSearch::motion(const Pose& here, const Pose& there, double turn) {
   const double carried = (length + costs_.arm * angle) / parts;
   double cost = length + costs_.turn_cost * angle;
   for (Index n = 1; n <= steps; ++n) {
+    if (limit.spent + cost >= limit.most) return kInfinity;
     const double part = static_cast<double>(n) / parts;
     const Pose pose{here.x + part * (there.x - here.x), here.y + part * (there.y - here.y),
                     here.theta + part * turn};
@@ -91,14 +94,14 @@ double RouteSearch::motion(const Pose& here, const Pose& there, double turn) {
 }
 
 /// Cost of a turn on the spot from one heading to another, and how to make it.
-RouteSearch::Turn RouteSearch::turn(Vec2 at, double heading, double to) {
+RouteSearch::Turn RouteSearch::turn(Vec2 at, double heading, double to, Limit limit) {
   const Pose here{at.x, at.y, heading};
   const Pose there{at.x, at.y, to};
   double turn = wrap_angle(to - heading);
   const double other = turn - std::copysign(2.0 * kPi, turn);
-  double cost = motion(here, there, turn);
+  double cost = motion(here, there, turn, limit);
   if (std::abs(turn) > kLittleTurn && costs_.turn_cost * std::abs(other) < cost) {
-    const double longer = motion(here, there, other);
+    const double longer = motion(here, there, other, limit);
     if (longer < cost) {
       cost = longer;
       turn = other;
@@ -108,13 +111,16 @@ RouteSearch::Turn RouteSearch::turn(Vec2 at, double heading, double to) {
 }
 
 /// Cost of turning to a point and driving there: ahead with sign 1, back with -1.
-RouteSearch::Leg RouteSearch::leg(Vec2 from, double heading, Vec2 to, double sign) {
+RouteSearch::Leg RouteSearch::leg(Vec2 from, double heading, Vec2 to, double sign, Limit limit) {
   const double dx = to.x - from.x;
   const double dy = to.y - from.y;
   if (std::hypot(dx, dy) < 1e-9) return {0.0, heading, 0.0};
   const double ahead = std::atan2(sign * dy, sign * dx);
-  auto [cost, side] = turn(from, heading, ahead);
-  if (cost < kInfinity) cost += motion({from.x, from.y, ahead}, {to.x, to.y, ahead}, 0.0);
+  auto [cost, side] = turn(from, heading, ahead, limit);
+  if (cost < kInfinity) {
+    cost += motion({from.x, from.y, ahead}, {to.x, to.y, ahead}, 0.0,
+                   {limit.spent + cost, limit.most});
+  }
   return {cost, ahead, side};
 }
 
@@ -137,11 +143,12 @@ Legs RouteSearch::cheapest_legs(std::span<const Vec2> points, double heading, do
       const Vec2 start = points[at(i)];
       const double straight = std::hypot(start.x - target.x, start.y - target.y);
       if (best[at(from)] + straight >= best[at(to)]) continue;
-      const Leg found = leg(start, headings[at(from)], target, sign);
+      const Limit limit{best[at(from)], kRounding * best[at(to)]};
+      const Leg found = leg(start, headings[at(from)], target, sign, limit);
       double cost = best[at(from)] + found.cost;
       double last = 0.0;
       if (j == count - 1 && cost < best[at(to)]) {
-        const Turn more = turn(target, found.heading, end);
+        const Turn more = turn(target, found.heading, end, {cost, kRounding * best[at(to)]});
         last = more.side;
         cost += more.cost;
       }

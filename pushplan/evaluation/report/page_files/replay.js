@@ -131,6 +131,11 @@ function drawView({ canvas, box, replay }) {
   };
   const { goal, frames, poses } = replay;
   if (goal.kind === "disc") { pen.beginPath(); pen.arc(...goal.center, goal.radius, 0, 2 * Math.PI); pen.fillStyle = "#009e7333"; pen.fill(); }
+  if (goal.heading !== undefined) {
+    const [[x, y], size] = [goal.center, Math.max(goal.radius, 14 / scale)];
+    const [dx, dy] = [size * Math.cos(goal.heading), size * Math.sin(goal.heading)];
+    filled([x - 0.35 * dy, y + 0.35 * dx, x + 0.35 * dy, y - 0.35 * dx, x + dx, y + dy], COLOURS.goal);
+  }
   if (goal.kind === "polygon") filled(goal.points, "#009e7322", COLOURS.goal);
   if (goal.kind === "line") {
     const [[px, py], [nx, ny]] = [goal.point, goal.normal];

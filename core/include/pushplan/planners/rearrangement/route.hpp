@@ -68,10 +68,16 @@ class RouteSearch {
     double side;     // of the turn before it
   };
 
+  /// A motion is of no use where what is spent before it and its own cost reach the most [m].
+  struct Limit {
+    double spent;
+    double most;
+  };
+
   Overlap overlap(const Pose& pose);
-  double motion(const Pose& here, const Pose& there, double turn);
-  Turn turn(Vec2 at, double heading, double to);
-  Leg leg(Vec2 from, double heading, Vec2 to, double sign);
+  double motion(const Pose& here, const Pose& there, double turn, Limit limit);
+  Turn turn(Vec2 at, double heading, double to, Limit limit);
+  Leg leg(Vec2 from, double heading, Vec2 to, double sign, Limit limit);
 
   RouteCosts costs_;
   Footprint shape_;
