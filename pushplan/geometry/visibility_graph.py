@@ -113,7 +113,9 @@ class VisibilityGraph:
         search = core.VisibilitySearch(free, corners, scene, grid, sliver)
         outcome = core.SearchOutcome.PAUSED
         budgets = 0
-        patience = _PLAIN_BUDGETS if has_many_corners(around) else _LONG_BUDGETS
+        patience = _LONG_BUDGETS
+        if has_many_corners(around):
+            patience = _PLAIN_BUDGETS
         while outcome == core.SearchOutcome.PAUSED:
             if stopped():
                 return Path(math.inf)

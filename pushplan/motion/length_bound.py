@@ -25,7 +25,9 @@ _DIRECTIONS = 360
 
 def too_long(static: StaticMap) -> float:
     """Fraction by which exact shortest paths on a map may come out too long."""
-    return _TOO_LONG * (COARSE**2 if has_many_corners(obstacles_of(static)) else 1.0)
+    if has_many_corners(obstacles_of(static)):
+        return _TOO_LONG * COARSE**2
+    return _TOO_LONG
 
 
 def length_bound(world: World, stopped: Callable[[], bool] = lambda: False) -> float:
@@ -45,7 +47,8 @@ def length_bound(world: World, stopped: Callable[[], bool] = lambda: False) -> f
     if few and not stopped() and is_clear(static, start, clearance):
         graph = VisibilityGraph(static, clearance, exact=True)
         length = float(graph.to_goal(start, goal, stopped).length)
-        around = length / (1.0 + too_long(static)) if np.isfinite(length) else 0.0
+        if np.isfinite(length):
+            around = length / (1.0 + too_long(static))
     robot = world.robot
     if robot.drive is Drive.CONSTANT_SPEED or (robot.drive is Drive.CAR and not robot.min_speed):
         radius = max(robot.turning_radius, TIGHTEST * robot.circumscribed_radius)
