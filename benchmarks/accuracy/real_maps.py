@@ -118,8 +118,12 @@ def fault_of(case: Case, plan: Plan, drivable: bool) -> str:
     known = 3 if drivable else 2
     if not np.allclose(plan.poses[0, :known], world.robot_pose[:known], atol=1e-9):
         return "starts elsewhere"
-    if not world.navigation_goal.reached_by(plan.poses[-1]):
+    goal = world.navigation_goal
+    x, y, theta = plan.poses[-1].tolist()
+    if goal.distance(x, y) > 1e-9:
         return "ends elsewhere"
+    if isinstance(goal, GoalPose) and abs(goal.heading_error(theta)) > goal.heading_tolerance:
+        return "ends at another heading"
     if not drivable:
         disc = (1.0 - TOUCH) * world.robot.inscribed_radius
         way = shapely.linestrings(plan.poses[:, :2])

@@ -3,6 +3,7 @@
     python -m benchmarks.speed.deadlines [CALLS] [--planners NAME ...]
     python -m benchmarks.speed.deadlines --worlds [CALLS] [--planners NAME ...]
     python -m benchmarks.speed.deadlines --posts POSTS [CALLS] [--planners NAME ...]
+    python -m benchmarks.speed.deadlines --offices POLYGONS [CALLS] [--planners NAME ...]
     python -m benchmarks.speed.deadlines --growth [CALLS] [--planners NAME ...] [--controllers]
 
 The first calls every planner CALLS times with a deadline of 50 ms on ten starts of its task and
@@ -15,9 +16,10 @@ The second calls every planner once in each of CALLS random worlds, each with an
 another map of which nothing is prepared, and writes the CPU time of the calls. The deadline is one
 of CPU time too, so that what else the machine does changes nothing.
 
-The third does the same in halls of so many posts.
+The third and the fourth do the same in halls of so many posts, and in furnished offices of about
+so many polygons, on each of which four calls are made.
 
-The fourth calls every planner CALLS times on a small start with a budget of a few iterations, and
+The fifth calls every planner CALLS times on a small start with a budget of a few iterations, and
 the controllers as often along a path, and writes how memory grows after the first tenth of the
 calls: the pages of the process, and what is in use of the heap of the C library, which compiled
 code and libraries allocate from (where that can be asked, as in glibc); then a hundredth of the
@@ -35,6 +37,7 @@ import time
 import tracemalloc
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -44,15 +47,18 @@ from benchmarks.reporting import command_line
 from pushplan.control import MpcTracker, PathFollower
 from pushplan.envs import make
 from pushplan.planners import make_planner
-from pushplan.scenarios import Scenario
+from pushplan.scenarios import Scenario, generate_office
+from pushplan.scenarios.office import start_and_goal
 from pushplan.world import (
     Controller,
     Deadline,
+    GoalDisc,
     MaxIterations,
     Movables,
     Planner,
     StopCheck,
     World,
+    turtlebot3_burger,
 )
 from pushplan.world.checks import FloatArray
 
@@ -175,15 +181,33 @@ def deadlines(names: list[str], calls: int) -> None:
         write(f"| `{name}` | " + " | ".join(f"{value:.1f}" for value in numbers) + " |")
 
 
-def any_world(names: list[str], calls: int, count: int) -> None:
+@lru_cache(maxsize=1)
+def office(polygons: int, seed: int) -> World:
+    """A furnished office."""
+    return generate_office(
+        np.random.default_rng(seed), robot=turtlebot3_burger(), polygons=polygons
+    )
+
+
+def office_world(polygons: int, seed: int, name: str) -> World:
+    """An office, the same for four seeds in a row, with a start and a goal of its own."""
+    world = office(polygons, seed // 4)
+    rng = np.random.default_rng(seed)
+    start, end = start_and_goal(rng, world.static, world.movables, world.robot)
+    return replace(world, robot_pose=start, goal=GoalDisc(end, 0.25))
+
+
+def any_world(
+    names: list[str], calls: int, worlds: str, world_of: Callable[[int, str], World]
+) -> None:
     """One row for each planner: CPU time of calls in worlds that were never seen.
 
     Args:
         names: the planners.
         calls: number of worlds.
-        count: posts in each hall; random worlds if 0.
+        worlds: what to call them.
+        world_of: makes the one of a seed, for a planner.
     """
-    worlds = f"halls of {count} posts" if count else "random worlds"
     write(f"CPU time with a deadline of {1e3 * BUDGET_S:.0f} ms, {calls} {worlds} [ms]", "")
     write("| planner | p50 | p99 | p99.9 | worst | over 65 ms |", "|---|---|---|---|---|---|")
     for name in names:
@@ -191,7 +215,7 @@ def any_world(names: list[str], calls: int, count: int) -> None:
         took = np.empty(calls)
         for seed in range(-min(_FIRST, calls), calls):
             rng = np.random.default_rng(abs(seed))
-            world = posts(count, seed % 2**32, name) if count else random_world(seed % 2**32, name)
+            world = world_of(seed % 2**32, name)
             began = time.thread_time()
             planner.plan(world, stop=CpuDeadline(BUDGET_S), rng=rng)
             if seed >= 0:
@@ -313,18 +337,26 @@ def main() -> None:
     parser.add_argument("calls", nargs="?", type=int, help="default: 10000, with --growth 100000")
     parser.add_argument("--worlds", action="store_true", help="random worlds instead of tasks")
     parser.add_argument("--posts", type=int, default=0, help="halls of so many posts instead")
+    parser.add_argument("--offices", type=int, default=0, help="offices of so many polygons")
     parser.add_argument("--planners", nargs="*", choices=known, default=list(known))
     parser.add_argument("--growth", action="store_true", help="memory instead of deadlines")
     parser.add_argument("--controllers", action="store_true", help="with --growth: them as well")
     options = parser.parse_args()
     if options.calls is not None and options.calls < 10:
         parser.error(f"calls must be at least 10, got {options.calls}")
-    if options.worlds or options.posts:
-        any_world(options.planners, options.calls or 10_000, options.posts)
+    calls = options.calls or 10_000
+    if options.offices:
+        office_of = partial(office_world, options.offices)
+        any_world(options.planners, calls, f"offices of {options.offices} polygons", office_of)
+    elif options.posts:
+        hall_of = partial(posts, options.posts)
+        any_world(options.planners, calls, f"halls of {options.posts} posts", hall_of)
+    elif options.worlds:
+        any_world(options.planners, calls, "random worlds", random_world)
     elif options.growth:
         memory(options.planners, options.calls or 100_000, options.controllers)
     else:
-        deadlines(options.planners, options.calls or 10_000)
+        deadlines(options.planners, calls)
 
 
 if __name__ == "__main__":

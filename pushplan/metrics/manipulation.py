@@ -126,7 +126,7 @@ def spanning_tree_length(static: StaticMap | None, points: list[FloatArray]) -> 
     """
     paths = None
     if static is not None and not static.is_empty:
-        paths = VisibilityGraph(static)
+        paths = VisibilityGraph(static, exact=True)
     graph: nx.Graph[int] = nx.empty_graph(len(points))
     for k, a in enumerate(points):
         for j, b in enumerate(points[:k]):

@@ -77,7 +77,7 @@ def shortest_length(
     radius = 0.0
     if clearance == "robot":
         radius = world.robot.inscribed_radius
-    graph = VisibilityGraph(world.static, clearance=radius)
+    graph = VisibilityGraph(world.static, clearance=radius, exact=True)
     start = episode.robot_poses[0, :2]
     if to_goal_point and isinstance(goal, GoalDisc):
         return float(graph.shortest_path(start, goal.center).length)

@@ -7,17 +7,27 @@ from collections.abc import Callable
 import numpy as np
 
 from pushplan.geometry import VisibilityGraph
+from pushplan.geometry.contours import COARSE, has_many_corners
+from pushplan.geometry.obstacles import obstacles_of
 from pushplan.geometry.shortest_path import leave_inflation
+from pushplan.geometry.visibility_graph import SOME_CORNERS
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.speed_profile import TIGHTEST
 from pushplan.world import Drive, GoalDisc, NavigationGoal, StaticMap, World
 from pushplan.world.checks import FloatArray
 
-TOO_LONG = 7e-4
-"""Fraction by which a `VisibilityGraph` may exceed the shortest path around arcs."""
+_TOO_LONG = 7e-4
+"""Fraction by which an exact `VisibilityGraph` may exceed the shortest path around arcs."""
 SLIM = 1e-3
 """Fraction by which the disc is less than the inscribed one: gaps as wide as the robot count."""
 _DIRECTIONS = 360
+
+
+def too_long(static: StaticMap) -> float:
+    """Fraction by which exact shortest paths on a map may come out too long."""
+    if has_many_corners(obstacles_of(static)):
+        return _TOO_LONG * COARSE**2
+    return _TOO_LONG
 
 
 def length_bound(world: World, stopped: Callable[[], bool] = lambda: False) -> float:
@@ -25,16 +35,20 @@ def length_bound(world: World, stopped: Callable[[], bool] = lambda: False) -> f
 
     Every path is at least as long as the shortest one of the robot's inscribed disc around the
     walls, and as the shortest one under its turn limit without walls; objects only add to that.
-    The former counts as nothing where the robot starts too near to a wall, or the stop rule fires.
+    The former counts as nothing where the robot starts too near to a wall, obstacles have more than
+    400 corners, or the stop rule fires.
     """
     goal = world.navigation_goal
     around = 0.0
     clearance = (1.0 - SLIM) * world.robot.inscribed_radius
     start = world.robot_pose[:2]
-    if not stopped() and is_clear(keep_out(world), start, clearance):
-        path = VisibilityGraph(keep_out(world), clearance).to_goal(start, goal, stopped)
-        length = float(path.length)
-        around = length / (1.0 + TOO_LONG) if np.isfinite(length) else 0.0
+    static = keep_out(world)
+    few = len(obstacles_of(static, clearance).vertices) <= SOME_CORNERS
+    if few and not stopped() and is_clear(static, start, clearance):
+        graph = VisibilityGraph(static, clearance, exact=True)
+        length = float(graph.to_goal(start, goal, stopped).length)
+        if np.isfinite(length):
+            around = length / (1.0 + too_long(static))
     robot = world.robot
     if robot.drive is Drive.CONSTANT_SPEED or (robot.drive is Drive.CAR and not robot.min_speed):
         radius = max(robot.turning_radius, TIGHTEST * robot.circumscribed_radius)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pushplan.geometry import goal_distances
-from pushplan.motion.length_bound import TOO_LONG
+from pushplan.motion.length_bound import too_long
 from pushplan.world import World
 from pushplan.world.outline import inscribed_radius
 
@@ -30,9 +30,10 @@ def transport_bound(world: World) -> float:
     if len(left) == 0:
         return 0.0
     distances = goal_distances(world.static, goal)
+    longer = 1.0 + too_long(world.static)
     lengths = np.zeros(len(left))
     for i, k in enumerate(left):
-        way = distances.path_from(movables.poses[k, :2]).length / (1.0 + TOO_LONG)
+        way = distances.path_from(movables.poses[k, :2]).length / longer
         if 0.0 < way < np.inf:
             # an origin outside of its object may get past walls, and need not get anywhere
             inner = max(map(inscribed_radius, movables.drawn_parts(int(k))))

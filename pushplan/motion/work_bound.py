@@ -19,7 +19,7 @@ import shapely
 
 from pushplan.geometry import VisibilityGraph
 from pushplan.motion.keep_out import keep_out
-from pushplan.motion.length_bound import SLIM, TOO_LONG, is_clear, length_bound
+from pushplan.motion.length_bound import SLIM, is_clear, length_bound, too_long
 from pushplan.world import StaticMap, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.outline import inscribed_radius
@@ -156,10 +156,11 @@ class _Relaxation:
             np.concatenate([self.static.radii, (self.inner - high)[solid]]),
             self.static.bounds,
         )
-        path = VisibilityGraph(static, self.clearance).to_goal(self.start, self.goal)
+        graph = VisibilityGraph(static, self.clearance, exact=True)
+        path = graph.to_goal(self.start, self.goal)
         if not np.isfinite(path.length):
             return None
-        length = float(path.length) / (1.0 + TOO_LONG)
+        length = float(path.length) / (1.0 + too_long(static))
         driven = shapely.linestrings(path.points[[0, *range(len(path.points))]])  # two at least
         near = shapely.distance(shapely.points(self.centers), driven)
         depths = np.maximum(0.0, self.clearance + self.inner - near)

@@ -46,6 +46,7 @@ def many_corners(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[int], No
 
     def set_to(corners: int) -> None:
         monkeypatch.setattr(contours, "MANY_CORNERS", corners)
+        monkeypatch.setattr(visibility_graph, "SOME_CORNERS", corners)
         forget_maps()
 
     yield set_to
