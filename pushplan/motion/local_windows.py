@@ -37,11 +37,11 @@ _STRAIGHT = 2.0  # distance behind a window to the next bend [turning radii]
 class _FirstPlanWithin(Stop):
     """Return with the first plan, or with the call that the window serves."""
 
-    stopped: Callable[[], bool]
+    stopped: Callable[[int], bool]  # asked with the iterations of the window
     iterations: int
 
     def start(self) -> Callable[[int, float], bool]:
-        return lambda done, cost: cost < np.inf or done >= self.iterations or self.stopped()
+        return lambda done, cost: cost < np.inf or done >= self.iterations or self.stopped(done)
 
 
 def warm_start(improver: PathImprover) -> None:
@@ -103,6 +103,8 @@ class _GuidedDrive:
         if ended is None:
             return False
         path, count = ended
+        if not (improver.pose_goal or improver.goal).reached_by(path.poses[count - 1]):
+            return False
         if path is not self._path:
             found = improver.sweep(path, count, improver.jam_cost)
             cost = np.inf if found is None else found

@@ -52,6 +52,8 @@ class Candidate:
     trial: core.SweptPath
     count: int
     cost: float
+    is_best: bool = False
+    """True if the best path is this one itself, not a copy of it."""
 
 
 class Lead(NamedTuple):
@@ -215,11 +217,11 @@ class PathImprover:
         """True if the best path is free of jams."""
         return self.best_cost < self.jam_cost
 
-    def stopped(self) -> bool:
-        """Return True if the stop rule fires now."""
+    def stopped(self, more: int = 0) -> bool:
+        """Return True if the stop rule fires now, or after so many iterations more."""
         if isinstance(self.contacts, SweptModel):
             self.contacts.raise_error()
-        return self._call.check(self.iterations, self.plan_cost)
+        return self._call.check(self.iterations + more, self.plan_cost)
 
     def candidate(
         self,
@@ -353,13 +355,14 @@ class PathImprover:
 
     def work_out_best(self) -> None:
         """Shortcut the best path."""
-        if self.best is None:
+        if self.best is None or self.stopped():
             return
         count = len(self.best.poses)
-        path, trial = (make_swept_path(3 * count + 200, len(self.world.movables)) for _ in "ab")
+        spare = count + count // 5 + 200  # shortcuts seldom make a path longer
+        path, trial = (make_swept_path(spare, len(self.world.movables)) for _ in "ab")
         for ours, best in zip(path, self.best, strict=True):
             ours[:count] = best
-        self.work_out(Candidate(path, trial.view(), count, self.best_cost))
+        self.work_out(Candidate(path, trial.view(), count, self.best_cost, is_best=True))
 
     def shortcut(self, candidate: Candidate) -> None:
         """Try `SHORTCUTS` shortcuts, as long as the stop rule allows."""
@@ -383,18 +386,20 @@ class PathImprover:
                     problem,
                     self.contacts,
                 )
-            self.keep(candidate.path, candidate.count, candidate.cost)
+            self.keep(candidate.path, candidate.count, candidate.cost, copied=not candidate.is_best)
             self.iterations += self._batch
 
-    def keep(self, path: SweptPath, count: int, cost: float) -> None:
-        """Keep a copy of the first ``count`` poses of a swept path if it is the best so far."""
+    def keep(self, path: SweptPath, count: int, cost: float, *, copied: bool = True) -> None:
+        """Keep the first ``count`` poses of a swept path, or a copy, if it is the best so far."""
         if cost >= self.best_cost:
             return
         if np.isnan(self.first_solution_s) and cost < self.jam_cost:
             self.first_solution_s = self._call.elapsed
         self.best_cost = cost
         self.tight = self.relaxed > 1
-        self.best = SweptPath(*(part[:count].copy() for part in path))
+        self.best = SweptPath(*(part[:count] for part in path))
+        if copied:
+            self.best = SweptPath(*(part.copy() for part in self.best))
 
     def result(self, status: PlanStatus, **detail: float) -> PlanResult:
         """The result of the call: the best path so far as a plan, where the status has one."""

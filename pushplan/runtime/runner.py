@@ -225,7 +225,7 @@ class Runner:
         of_robot = isinstance(world.goal, GoalDisc | GoalLine)
         exact = of_robot and not self._allowance.is_noisy
         once = exact or not world.robot.can_stop  # one that drives on may be out soon
-        ready = once or self._estimator.is_settled(self._noise, robot_only=of_robot)
+        ready = once or self._estimator.is_settled(self._noise, world.goal)
         if seen.goal_reached and ready:
             self._done += 1
         else:

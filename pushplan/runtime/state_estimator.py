@@ -12,7 +12,7 @@ import numpy as np
 
 from pushplan.control.stopping import add_arc
 from pushplan.interaction.path_sweepers import default_interaction
-from pushplan.world import RobotModel, Twist, World
+from pushplan.world import Goal, GoalPose, NavigationGoal, RobotModel, Twist, World
 from pushplan.world.checks import BoolArray, FloatArray
 
 _REACH = 1.1  # what is farther from the robot's path than this many radii is not moved
@@ -68,10 +68,14 @@ class StateEstimator:
             left = np.minimum(left, 0.5 * (np.sqrt(gained**2 + 4.0 * gained * noise) - gained))
         return np.sqrt(left)
 
-    def is_settled(self, noise: FloatArray, *, robot_only: bool) -> bool:
-        """True if no more than a noise (3,) is left in all poses, or in the robot's place."""
+    def is_settled(self, noise: FloatArray, goal: Goal) -> bool:
+        """True if no more than a noise (3,) is left in what decides whether a goal is reached."""
         ready = (self._variances <= _SETTLED * noise**2) | (self._noise == 0.0)
-        return bool(ready[:1, :2].all() if robot_only else ready.all())
+        if isinstance(goal, GoalPose):
+            ready = ready[:1]
+        elif isinstance(goal, NavigationGoal):
+            ready = ready[:1, :2]
+        return bool(ready.all())
 
     def reset(self) -> None:
         """Forget everything."""

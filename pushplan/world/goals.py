@@ -58,7 +58,7 @@ class GoalPose(GoalDisc):
         heading_tolerance: to either side [rad], positive, at most π.
     """
 
-    heading: float
+    heading: Annotated[float, Limits(-1e3, 1e3)]
     heading_tolerance: Annotated[float, Limits(0.0, math.pi, open_low=True)]
 
     @property

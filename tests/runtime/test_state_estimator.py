@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from pushplan.geometry.transforms import arc_step
 from pushplan.runtime import StateEstimator
-from pushplan.world import ClearanceArea, Drive, StaticMap, Twist, World
+from pushplan.world import ClearanceArea, Drive, GoalDisc, StaticMap, Twist, World
 from pushplan.world.checks import FloatArray
 
 PERIOD = 0.05
@@ -116,7 +116,7 @@ def test_without_known_noise_the_gain_is_fixed() -> None:
         got = estimator.observe(world).movables.poses
         assert got == pytest.approx(believed, abs=1e-12)
     assert not estimator.remaining_noise(ROBOT, PERIOD).any()
-    assert estimator.is_settled(np.zeros(3), robot_only=False)
+    assert estimator.is_settled(np.zeros(3), ROOM.goal)
 
 
 def test_an_estimate_is_ready_when_no_more_noise_is_left_than_in_the_end() -> None:
@@ -126,7 +126,7 @@ def test_an_estimate_is_ready_when_no_more_noise_is_left_than_in_the_end() -> No
     ready = []
     for n in range(100):
         estimator.observe(seen(ROOM.moved(time=n * PERIOD), rng))
-        ready.append(estimator.is_settled(left, robot_only=False))
+        ready.append(estimator.is_settled(left, ROOM.goal))
     assert not any(ready[:3])
     assert np.mean(ready[50:]) > 0.8  # an outlier is looked at again
 
@@ -142,5 +142,5 @@ def test_what_nobody_sees_becomes_no_surer() -> None:
             np.vstack([now.movables.poses[:1], world.movables.poses[1:]])
         )
         world = estimator.observe(now.moved(movable_poses=hidden.poses))
-    assert estimator.is_settled(left, robot_only=True)
-    assert not estimator.is_settled(left, robot_only=False)
+    assert estimator.is_settled(left, GoalDisc((0.0, 0.0), 1.0))
+    assert not estimator.is_settled(left, ROOM.goal)

@@ -175,8 +175,6 @@ def find_route(
     cheapest: Route | None = None
     for last in ([start[:2]], []):  # it may be too near to a wall to turn there
         for points, longest in ((corners, len(corners) + 1), (every, _LONGEST_LEG), (every, 1)):
-            if scene.budget.is_over and scene.budget.stopped:
-                return cheapest
             through = np.array([*near, *points, *last])
             found = _cheapest(search, through, float(here[2]), end, len(near), longest)
             if found is None or (cheapest is not None and found.cost >= cheapest.cost):

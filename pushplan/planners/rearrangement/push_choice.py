@@ -252,10 +252,7 @@ def _select(
             if budget.is_used_up:
                 if budget.stopped or any(math.isfinite(one.cost) for one in known.values()):
                     return None
-            found = _first_push(scene, graph.approach, push)
-            if budget.stopped and (found is None or not math.isfinite(found.cost)):
-                return None  # it may only be that there was no time for a route
-            simulated[id(push)] = push, found
+            simulated[id(push)] = push, _first_push(scene, graph.approach, push)
         found = simulated[id(push)][1]
         if found is None:
             return math.inf, ()
@@ -263,18 +260,22 @@ def _select(
         budget.cost = min(budget.cost, found.cost)
         return found.cost + penalty(push), found.push.delivers
 
+    done = [n for n, push in enumerate(graph.pushes) if id(push) in simulated]
     order = sequence_pushes(
-        graph, simulated_cost, scene.config.max_simulations, budget.time_limit, last
+        graph, simulated_cost, scene.config.max_simulations, budget.time_limit, last, done
     )
     plan = tuple(graph.pushes[n] for n in order)
     return PushChoice(graph, plan, known[order[0]] if order else None)
 
 
 def _first_push(scene: PushScene, approach: ApproachTree, push: Push) -> SimulatedPush | None:
-    """A push with the route to it, which leads around its object where the cheapest one fails."""
+    """A push with the route to it, which leads around its object where the cheapest one fails.
+
+    A push that is begun is finished: the next decision would begin with the same one.
+    """
     target = int(np.flatnonzero(scene.movables.ids == push.target)[0])
     found = _simulated(scene, approach, push, target)
-    if (found is None or not math.isfinite(found.cost)) and not scene.budget.stopped:
+    if found is None or not math.isfinite(found.cost):
         around = scene.known(("around", target), lambda: approach_tree(scene, target))
         found = _simulated(scene, around, push, target) or found
     return found

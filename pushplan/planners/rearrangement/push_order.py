@@ -76,6 +76,7 @@ def sequence_pushes(
     most: int,
     stop: Stop | None = None,
     last: Sequence[Push] = (),
+    done: Sequence[int] = (),
 ) -> list[int]:
     """The order of pushes, with the first one simulated.
 
@@ -88,12 +89,13 @@ def sequence_pushes(
         most: how many pushes are simulated at most.
         stop: a time limit; None for none.
         last: the pushes of the last plan, in order, from which a search with a time limit begins.
+        done: pushes that have been simulated before, which such a search knows.
     """
     count = len(graph.objects)
     if not count:
         return []
     if count > core.MAX_EXACT:
-        return _by_tours(graph, simulated_cost, most, stop, last)
+        return _by_tours(graph, simulated_cost, most, stop, last, done)
     best, following = core.cost_to_go(graph.costs, graph.masks, count)
     rest = np.array([best[graph.masks[n], n] for n in range(len(graph.masks))])
     guess = graph.costs[-1] + rest
@@ -124,15 +126,20 @@ def _by_tours(
     most: int,
     stop: Stop | None,
     last: Sequence[Push],
+    done: Sequence[int],
 ) -> list[int]:
     """As `sequence_pushes`, with a tour anew for every push that is simulated."""
     initial: list[int] = []
+    costs: FloatArray = graph.costs.copy()
+    known: dict[int, float] = {}
     if stop is not None:
+        for n in done:
+            found = simulated_cost(n)
+            if found is not None:
+                known[n] = costs[-1, n] = found[0]
         places = {signature(push): n for n, push in enumerate(graph.pushes)}
         initial = [places[key] for key in map(signature, last) if key in places]
         initial += np.argsort(graph.costs[-1], kind="stable").tolist()
-    costs: FloatArray = graph.costs.copy()
-    known: dict[int, float] = {}
     for _ in range(most):
         order, total = push_order(replace(graph, costs=costs), stop=stop, initial=initial)
         if not order or not math.isfinite(total):

@@ -77,7 +77,7 @@ class SearchBudget:
         if not self._over:
             stopped = self._check is not None and self._check(self.used, self.cost)
             self._over = stopped or self.used >= _HARDEST * self._most
-            self.stopped = stopped and self.seconds < math.inf
+            self.stopped = stopped and self._elapsed >= self.seconds
             self.out_of_time |= self.stopped
             self.interrupted |= self._over
         return self._over
