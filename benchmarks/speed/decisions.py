@@ -1,4 +1,4 @@
-"""How good and how long decisions of `gtsp-mpc` are, by their deadline.
+"""Scores of `gtsp-mpc` and times of its decisions, by their deadline.
 
     python -m benchmarks.speed.decisions [--suites NAME ...] [--episodes N] [--seed FIRST]
 

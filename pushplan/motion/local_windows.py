@@ -30,7 +30,7 @@ _ROOM = 1.1  # clearance where a window ends [R]
 _GOAL = 0.5  # radius of its goal [R]
 _WINDOWS = 60  # windows along one guide at most
 _ITERATIONS = 2_000  # of the search in one window at most
-_STRAIGHT = 2.0  # distance behind a window to the next bend [turning radii]
+_STRAIGHT = 2.0  # distance behind a window to the next via [turning radii]
 
 
 @dataclass(frozen=True)

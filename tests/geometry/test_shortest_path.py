@@ -35,7 +35,7 @@ GOAL = GoalDisc(np.array([3.75, 3.75]), 1.86)
 
 
 def forget_maps() -> None:
-    """What is kept of maps depends on which of them count as large."""
+    """Empty the caches of maps, which depend on which maps count as large."""
     for kept in (contours._maker_of, visibility_graph._boxes_of, visibility_graph._covered_sides):
         kept.cache_clear()
 

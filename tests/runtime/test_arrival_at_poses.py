@@ -26,7 +26,7 @@ def scene(drive, **limits):
 
 
 def rest(world, name, noise=(0.0, 0.0), seconds=60.0):
-    """Where the robot comes to rest after the runner has said that it is done."""
+    """The pose at which the robot comes to rest after the runner has said that it is done."""
     rng = np.random.default_rng(0)
     true = world
     options = {"position_noise": noise[0], "heading_noise": noise[1]}

@@ -68,7 +68,10 @@ LIMITS = {"mass": 1.0, "drive": "differential", "max_speed": 1.0, "max_turn_rate
         (lambda: GoalLine([0, 0], [0, 0]), "not be zero"),
         (lambda: GoalPose([0, 0, 0], 0.1, 0.0, 0.1), "goal.center must have shape (2,)"),
         (lambda: GoalPose([0, 0], -0.1, 0.0, 0.1), "goal.radius"),
-        (lambda: GoalPose([0, 0], 0.1, NAN, 0.1), "goal.heading must lie in [-1000, 1000], got nan"),
+        (
+            lambda: GoalPose([0, 0], 0.1, NAN, 0.1),
+            "goal.heading must lie in [-1000, 1000], got nan",
+        ),
         (lambda: GoalPose([0, 0], 0.1, 0.0, 0.0), "goal.heading_tolerance must lie in (0, 3.14"),
         (lambda: GoalPose([0, 0], 0.1, 0.0, 4.0), "goal.heading_tolerance must lie in (0, 3.14"),
         (lambda: ClearanceArea(SQUARE, [True] * 3), "goal.open_edges must have shape (4,)"),

@@ -139,7 +139,7 @@ def choose_push(
     def penalty(push: Push) -> float:
         return history.penalty(push, config) * size + sum(term(push) for term in terms)
 
-    def way_out() -> FloatArray | None:
+    def find_recovery() -> FloatArray | None:
         return recovery_path(scene.world, 0.5 * MARGIN * size)
 
     def choose(rule: Stop | None) -> PushChoice:
@@ -156,14 +156,14 @@ def choose_push(
             if scene.budget.out_of_time:
                 return replace(known, interrupted=True)
         if "no push" in scene.progress:
-            scene.known("recovery", way_out)
+            scene.known("recovery", find_recovery)
         choice = select_push(scene, penalty, last)
         if choice.first is not None:
             scene.progress["choice"] = choice
         recovery = None
         if choice.first is None and not scene.budget.stopped:
             if "recovery" in scene.progress or scene.budget.has_room(_RECOVERY_S):
-                recovery = scene.known("recovery", way_out)
+                recovery = scene.known("recovery", find_recovery)
             else:
                 scene.progress["no push"] = True
         return replace(

@@ -27,7 +27,7 @@ ROOM = World(
 
 
 def approaches(position: float, degrees: float, seed: int) -> tuple[int, float]:
-    """How many pushes are taken up until the first one begins, and the way to it [m]."""
+    """Pushes taken up until the first one begins, and the length of the way to it [m]."""
     noise = Disturbances(position_noise=position, heading_noise=math.radians(degrees))
     policy = DisturbedPolicy(GtspMpc(), noise, period=PERIOD)
     policy.reset(ROOM, np.random.default_rng(seed))
