@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import functools
+import math
 
 import numpy as np
 from PIL import Image
 
 from pushplan.drawing.canvas import Canvas
 from pushplan.drawing.palette import Palette
-from pushplan.world import ClearanceArea, Goal, GoalDisc, GoalLine, GoalPose, StaticMap
+from pushplan.world import (
+    ClearanceArea,
+    Goal,
+    GoalDisc,
+    GoalLine,
+    GoalPose,
+    ObjectGoals,
+    StaticMap,
+)
 from pushplan.world.checks import FloatArray
 
 Bounds = tuple[float, ...]
@@ -39,7 +48,7 @@ def draw_ground(canvas: Canvas, static: StaticMap, goal: Goal, palette: Palette)
     if isinstance(goal, GoalDisc):
         canvas.disc(goal.center, goal.radius, fill, edge, 1.5)
         if isinstance(goal, GoalPose):
-            canvas.polygon(heading_arrow(goal, max(goal.radius, canvas.metres(14.0))), edge, edge)
+            canvas.polygon(arrow_head(goal.pose, max(goal.radius, canvas.metres(14.0))), edge, edge)
     elif isinstance(goal, GoalLine):
         reach = 2.0 * float(np.hypot(*(static.bounds[2:] - static.bounds[:2])))
         along = reach * np.array([-goal.normal[1], goal.normal[0]])
@@ -50,6 +59,15 @@ def draw_ground(canvas: Canvas, static: StaticMap, goal: Goal, palette: Palette)
         canvas.line(np.stack([a, b]), edge, 2.5)
     elif isinstance(goal, ClearanceArea):
         _clearance_area(canvas, goal, palette)
+    elif isinstance(goal, ObjectGoals):
+        for pose, radius, turn in zip(
+            goal.poses, goal.radii.tolist(), goal.heading_tolerances.tolist(), strict=True
+        ):
+            canvas.disc(pose[:2], max(radius, canvas.metres(3.0)), fill, edge, 1.5)
+            if turn < math.pi:
+                canvas.polygon(arrow_head(pose, max(radius, canvas.metres(14.0))), edge, edge)
+        if goal.robot is not None:
+            draw_ground(canvas, StaticMap.build(bounds=static.bounds), goal.robot, palette)
     else:
         canvas.polygon(goal.polygon, fill, edge, 3.0)
     for polygon in static.polygons:
@@ -58,11 +76,11 @@ def draw_ground(canvas: Canvas, static: StaticMap, goal: Goal, palette: Palette)
         canvas.thick_segment(line, max(float(radius), canvas.metres(1.5)), palette.wall)
 
 
-def heading_arrow(goal: GoalPose, length: float) -> FloatArray:
-    """(3, 2) corners of an arrow head [m] from the middle of a goal along its heading."""
-    ahead = length * np.array([np.cos(goal.heading), np.sin(goal.heading)])
+def arrow_head(pose: FloatArray, length: float) -> FloatArray:
+    """(3, 2) corners of an arrow head [m] from a pose (3,) along its heading."""
+    ahead = length * np.array([np.cos(pose[2]), np.sin(pose[2])])
     aside = 0.35 * np.array([-ahead[1], ahead[0]])
-    return np.array([goal.center + aside, goal.center - aside, goal.center + ahead])
+    return np.array([pose[:2] + aside, pose[:2] - aside, pose[:2] + ahead])
 
 
 def _clearance_area(canvas: Canvas, goal: ClearanceArea, palette: Palette) -> None:

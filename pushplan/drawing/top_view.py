@@ -12,7 +12,7 @@ from PIL import Image, ImageDraw, ImageFont
 from pushplan.drawing.canvas import Canvas
 from pushplan.drawing.ground import Bounds, ground_picture
 from pushplan.drawing.palette import FLOOR_PALETTE, Palette, palette_of
-from pushplan.world import Plan, StaticMap, World
+from pushplan.world import ObjectGoals, Plan, StaticMap, World
 from pushplan.world.checks import FloatArray, array, frozen, integer, number
 from pushplan.world.outline import transform
 
@@ -86,6 +86,13 @@ def draw_moving(
         paths: FloatArray = array("object_trails", object_trails, (None, len(objects), 3))
         for k in range(len(objects)):
             canvas.line(paths[:, k, :2], palette.ghost, 1.5)
+    if isinstance(world.goal, ObjectGoals):
+        for part in world.goal_polygons:
+            canvas.polygon(part, None, palette.goal[1], 1.5)
+        places = world.goal.assigned(objects.ids, objects.poses)
+        for k in np.flatnonzero(places >= 0).tolist():
+            line = np.stack([objects.poses[k, :2], world.goal.poses[places[k], :2]])
+            canvas.line(line, palette.goal[1], 1.0, dash_m=canvas.metres(SHORT))
     reach = canvas.bounds
     middles = objects.poses[:, :2]
     radii = objects.radii[:, None]

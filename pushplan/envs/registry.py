@@ -15,6 +15,7 @@ TASKS = Registered(
         "area_clearing": "pushplan.envs.tasks.area_clearing:AreaClearingTask",
         "ship_ice": "pushplan.envs.tasks.ship_ice:ShipIceTask",
         "room": "pushplan.envs.tasks.room:RoomTask",
+        "rearrange": "pushplan.envs.tasks.rearrange:RearrangeTask",
         "office": "pushplan.envs.tasks.office:OfficeTask",
     },
 )

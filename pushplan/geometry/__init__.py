@@ -3,6 +3,7 @@
 from pushplan.geometry.convex import convex_distance, convex_overlap, convex_penetration
 from pushplan.geometry.distance_field import GeodesicField, geodesic_field, sample_values
 from pushplan.geometry.grid import Grid, clearance_field, occupancy
+from pushplan.geometry.object_ways import object_ways
 from pushplan.geometry.obstacles import core_distance
 from pushplan.geometry.polygon import (
     gyration_squares,
@@ -30,6 +31,7 @@ __all__ = [
     "geodesic_field",
     "goal_distances",
     "gyration_squares",
+    "object_ways",
     "occupancy",
     "polygon_area",
     "polygon_centroid",

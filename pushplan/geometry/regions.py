@@ -10,7 +10,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pushplan.core import geometry as core
-from pushplan.world import ClearanceArea, Goal, GoalDisc, GoalLine, InvalidInputError, Receptacle
+from pushplan.world import (
+    ClearanceArea,
+    Goal,
+    GoalDisc,
+    GoalLine,
+    InvalidInputError,
+    ObjectGoals,
+    Receptacle,
+)
 from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, array
 from pushplan.world.outline import convex_outline, flatten, unflatten
 
@@ -38,8 +46,8 @@ def as_target(goal: Goal | Sequence[ArrayLike]) -> Target:
         return goal
     if isinstance(goal, str | np.ndarray) or not isinstance(goal, Sequence) or not len(goal):
         raise InvalidInputError(
-            "distances are measured to a GoalDisc, GoalLine, Receptacle, ClearanceArea, or to a "
-            f"list of convex polygons and segments, got {type(goal).__name__}"
+            "distances are measured to a GoalDisc, GoalLine, Receptacle, ClearanceArea or "
+            f"ObjectGoals, or to a list of convex polygons and segments, got {type(goal).__name__}"
         )
     parts = []
     for i, part in enumerate(goal):
@@ -53,7 +61,8 @@ def as_target(goal: Goal | Sequence[ArrayLike]) -> Target:
 def regions_of(target: Target, *, to_center: bool = False) -> core.Regions:
     """The regions of a checked target; ``to_center`` shrinks a disc to its centre.
 
-    Those of a clearance area are its open edges, see `outside_area`.
+    Those of a clearance area are its open edges, see `outside_area`; those of `ObjectGoals` the
+    discs of all its places.
     """
     discs = np.zeros((0, 3))
     lines = np.zeros((0, 4))
@@ -62,6 +71,9 @@ def regions_of(target: Target, *, to_center: bool = False) -> core.Regions:
         discs = np.array([[*target.center, 0.0 if to_center else target.radius]])
     elif isinstance(target, GoalLine):
         lines = np.array([[*target.point, *target.normal]])
+    elif isinstance(target, ObjectGoals):
+        radii = np.zeros(len(target.ids)) if to_center else target.radii
+        discs = np.column_stack([target.poses[:, :2], radii])
     elif isinstance(target, Receptacle):
         parts = (target.polygon,)
     elif isinstance(target, ClearanceArea):

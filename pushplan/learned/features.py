@@ -95,7 +95,8 @@ class FeatureObservation(LimitedVector, CheckedFields):
             out[4] = length / self.range
             out[7] = 1.0
         else:
-            out[:4] = np.tile((centroid(goal.polygon) - at) @ to_body, 2)
+            middle = centroid(world.area_goal.polygon)
+            out[:4] = np.tile((middle - at) @ to_body, 2)
         x0, y0, x1, y1 = world.static.bounds.tolist()
         gaps = (at[0] - x0, at[1] - y0, x1 - at[0], y1 - at[1])
         nearest = int(np.argmin(gaps))

@@ -9,9 +9,10 @@ import networkx as nx
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from pushplan.geometry import VisibilityGraph, goal_distances
+from pushplan.geometry import VisibilityGraph, object_ways
+from pushplan.geometry.object_ways import shared_ways
 from pushplan.metrics.lengths import interaction_work, object_path_lengths, robot_path_length
-from pushplan.world import ClearanceArea, Episode, Receptacle, StaticMap, World
+from pushplan.world import AreaGoal, Episode, GoalDisc, ObjectGoals, Receptacle, StaticMap, World
 from pushplan.world.checks import BoolArray, FloatArray
 from pushplan.world.outline import centroid
 
@@ -24,7 +25,8 @@ class ManipulationScores:
     """Scores of a robot that brings objects to where they belong.
 
     Args:
-        success: S_manip in [0, 1]: the fraction of the objects whose sub-task was completed.
+        success: S_manip in [0, 1]: the fraction of the objects with a sub-task whose sub-task was
+            completed.
         efficiency: E_manip: L*(O') over driven length. The tree is no strict lower bound, so it
             can pass 1; 0 if nothing was completed.
         effort: I_manip in [0, 1]: the least work for what was completed over all work.
@@ -95,14 +97,15 @@ def shortest_lengths(start: World, chosen: BoolArray, *, reference: bool = False
         reference: as in `manipulation_scores`.
     """
     lengths = np.zeros(len(chosen))
-    places = start.movables.poses[:, :2]
+    goal = start.manipulation_goal
+    ids = start.movables.ids[chosen]
+    places = start.movables.poses[chosen, :2]
     if reference:
-        ends = _reference_ends(start.manipulation_goal)
-        lengths[chosen] = cdist(places[chosen], ends).min(axis=1)
-        return lengths
-    distances = goal_distances(start.static, start.manipulation_goal)
-    for k in np.flatnonzero(chosen):
-        lengths[k] = distances.path_from(places[k]).length
+        lengths[chosen] = shared_ways(
+            goal, ids, places, lambda end, points: cdist(points, _reference_ends(end)).min(axis=1)
+        )
+    else:
+        lengths[chosen] = object_ways(start.static, goal, ids, places)
     return lengths
 
 
@@ -191,8 +194,10 @@ def _completed(episode: Episode) -> BoolArray:
     return episode.completed
 
 
-def _reference_ends(goal: Receptacle | ClearanceArea) -> FloatArray:
-    """(N, 2) places [m] that the original's code takes for the goal."""
+def _reference_ends(goal: AreaGoal | GoalDisc) -> FloatArray:
+    """(N, 2) places [m] that the original's code takes for the goal; the middle of a disc."""
+    if isinstance(goal, GoalDisc):
+        return goal.center[None]
     if isinstance(goal, Receptacle):
         return centroid(goal.polygon)[None]
     fractions = (np.arange(EDGE_PLACES) + 0.5)[:, None, None] / EDGE_PLACES
@@ -201,9 +206,35 @@ def _reference_ends(goal: Receptacle | ClearanceArea) -> FloatArray:
     return ends.reshape(-1, 2)
 
 
+def place_error(episode: Episode) -> float | None:
+    """Mean distance [m] of the objects from the middles of their places at the end."""
+    return _errors(episode)[0]
+
+
+def heading_error(episode: Episode) -> float | None:
+    """Mean turn [rad] of the objects from their headings at the end, up to symmetry."""
+    return _errors(episode)[1]
+
+
+def _errors(episode: Episode) -> tuple[float, float] | tuple[None, None]:
+    """Mean errors at the end, of a goal with a place for each object; None for other goals."""
+    goal = episode.world.goal
+    if not isinstance(goal, ObjectGoals):
+        return None, None
+    poses = episode.object_poses[-1]
+    places = goal.assigned(episode.world.movables.ids, poses)
+    k = np.flatnonzero(places >= 0)
+    if not len(k):
+        return None, None
+    distances, turns = goal.errors(poses[k, None])
+    chosen = np.arange(len(k)), places[k]
+    return float(distances[chosen].mean()), float(turns[chosen].mean())
+
+
 def s_manip(episode: Episode) -> float:
     """S_manip of an episode."""
     done = _completed(episode)
+    done = done[episode.world.wanted]
     return float(done.mean()) if len(done) else 1.0
 
 

@@ -82,6 +82,12 @@ _METRICS: dict[str, Metric] = {
     "I_manip_reference": Metric(
         f"{_MANIPULATION}:i_manip_reference", Role.ON_REQUEST, goal="objects"
     ),
+    "place_error_m": Metric(
+        f"{_MANIPULATION}:place_error", Role.ON_REQUEST, higher_is_better=False, goal="objects"
+    ),
+    "heading_error_rad": Metric(
+        f"{_MANIPULATION}:heading_error", Role.ON_REQUEST, higher_is_better=False, goal="objects"
+    ),
     "made_unsolvable": Metric(
         "pushplan.metrics.closing:made_unsolvable",
         Role.ON_REQUEST,

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pushplan.geometry import goal_distances
+from pushplan.geometry import object_ways
 from pushplan.motion.length_bound import too_long
-from pushplan.world import World
+from pushplan.world import AreaGoal, World
 from pushplan.world.outline import inscribed_radius
 
 
@@ -14,8 +14,8 @@ def transport_bound(world: World) -> float:
     """A lower bound on m₀ l₀ + Σ mᵢ lᵢ of a robot that brings all objects to their goal [kg m].
 
     The middle of each object that is not done travels at least the shortest path of a point around
-    what is static, and its inscribed radius more, as all of the object has to be in the goal, or
-    out of the area over an open edge. The robot drives at least up to the nearest object, done or
+    what is static, and for an area its inscribed radius more, as all of the object has to be in
+    it, or out of it over an open edge. The robot drives at least up to the nearest object, done or
     not, as that may push the others; how far beyond that has no such bound, as it may push several
     objects at once. Objects that are fixed are static, and need not get anywhere.
 
@@ -29,12 +29,11 @@ def transport_bound(world: World) -> float:
     left = np.flatnonzero(~world.completed)
     if len(left) == 0:
         return 0.0
-    distances = goal_distances(world.static, goal)
-    longer = 1.0 + too_long(world.static)
-    lengths = np.zeros(len(left))
-    for i, k in enumerate(left):
-        way = distances.path_from(movables.poses[k, :2]).length / longer
-        if 0.0 < way < np.inf:
+    ways = object_ways(world.static, goal, movables.ids[left], movables.poses[left, :2])
+    lengths = ways / (1.0 + too_long(world.static))
+    lengths[~np.isfinite(lengths)] = 0.0
+    for i, (k, way) in enumerate(zip(left, lengths.tolist(), strict=True)):
+        if isinstance(goal, AreaGoal) and way > 0.0:
             # an origin outside of its object may get past walls, and need not get anywhere
             inner = max(map(inscribed_radius, movables.drawn_parts(int(k))))
             lengths[i] = way + inner if inner > 0.0 else 0.0

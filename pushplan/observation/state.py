@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pushplan.observation.builder import LimitedVector
-from pushplan.world import GoalDisc, GoalLine, World
+from pushplan.world import GoalDisc, GoalLine, ObjectGoals, World
 from pushplan.world.checked_fields import CheckedFields, NonNegativeInt, PositiveFloat
 from pushplan.world.checks import FloatArray, expect
 from pushplan.world.outline import centroid
@@ -74,4 +74,7 @@ def _goal_point(world: World) -> FloatArray:
     if isinstance(goal, GoalLine):
         nearest: FloatArray = at + np.dot(goal.point - at, goal.normal) * goal.normal
         return nearest
+    if isinstance(goal, ObjectGoals):
+        middle: FloatArray = goal.poses[:, :2].mean(axis=0)
+        return middle
     return centroid(goal.polygon)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pushplan.world import ClearanceArea, Drive, InvalidInputError, Receptacle, World
+from pushplan.world import Drive, InvalidInputError, World
 
 
 def check_pusher(world: World) -> None:
@@ -16,8 +16,4 @@ def check_pusher(world: World) -> None:
     """
     if world.robot.drive is not Drive.DIFFERENTIAL:
         raise InvalidInputError("pushing objects needs a robot with a differential drive")
-    if not isinstance(world.goal, Receptacle | ClearanceArea):
-        raise InvalidInputError(
-            "pushing objects needs a goal for the objects (Receptacle or ClearanceArea), "
-            f"got {type(world.goal).__name__}"
-        )
+    _ = world.area_goal

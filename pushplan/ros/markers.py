@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.drawing.ground import heading_arrow
+from pushplan.drawing.ground import arrow_head
 from pushplan.ros.ros_messages import Messages
-from pushplan.world import GoalDisc, GoalPose, ManipulationGoal, World
+from pushplan.world import GoalDisc, GoalPose, World
 from pushplan.world.checks import FloatArray
 
 # of visualization_msgs/Marker: type, and actions
@@ -33,9 +33,9 @@ def scene_markers(messages: Messages, world: World) -> Any:
         area = [goal.center + goal.radius * np.stack([np.cos(_CIRCLE), np.sin(_CIRCLE)], axis=1)]
         if isinstance(goal, GoalPose):
             size = max(goal.radius, 0.5 * world.robot.circumscribed_radius)
-            area.append(heading_arrow(goal, size))
-    elif isinstance(goal, ManipulationGoal):
-        area = [goal.polygon]
+            area.append(arrow_head(goal.pose, size))
+    else:
+        area = list(world.goal_polygons)
     base = messages.base_frame
     frame = messages.frame_id
     time = world.time

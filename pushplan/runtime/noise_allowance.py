@@ -15,13 +15,14 @@ from pushplan.world import (
     GoalLine,
     GoalPose,
     InvalidInputError,
+    ObjectGoals,
     Receptacle,
     RobotModel,
     StaticMap,
     World,
 )
 from pushplan.world.checks import FloatArray, expect
-from pushplan.world.goals import ManipulationGoal
+from pushplan.world.goals import AreaGoal
 from pushplan.world.outline import outward_normals
 
 _SURE = 3.0  # standard deviations by which the robot, or an object, has to be within its goal
@@ -71,6 +72,13 @@ class NoiseAllowance:
         elif isinstance(goal, GoalLine):
             if inset > 0.0:
                 world = replace(world, goal=replace(goal, point=goal.point + inset * goal.normal))
+        elif isinstance(goal, ObjectGoals):
+            turns = goal.heading_tolerances
+            less = np.where(
+                turns < math.pi, np.maximum(turns - _SURE * self.heading, 0.5 * turns), turns
+            )
+            radii = np.maximum(goal.radii - inset, 0.5 * goal.radii)
+            world = replace(world, goal=replace(goal, radii=radii, heading_tolerances=less))
         elif self.is_noisy:
             farthest = float(world.movables.radii.max(initial=0.0))
             inset = _SURE * math.hypot(self.place, self.heading * farthest)
@@ -84,7 +92,7 @@ class NoiseAllowance:
 
 
 @functools.lru_cache(maxsize=8)
-def _surer_goal(goal: ManipulationGoal, static: StaticMap, inset: float) -> ManipulationGoal:
+def _surer_goal(goal: AreaGoal, static: StaticMap, inset: float) -> AreaGoal:
     """The goal for objects, farther out, or farther in except where a wall is behind it [m]."""
     corners = goal.polygon
     normals = outward_normals(corners)

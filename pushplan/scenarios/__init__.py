@@ -1,6 +1,6 @@
-"""Fully specified starts, named lists of them, fields of broken ice, and offices.
+"""Fully specified starts, named lists of them, fields of broken ice, offices and rearrangements.
 
-What makes ice and offices only comes on first use.
+What makes them only comes on first use.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from pushplan.scenarios.ice_files import load_ice, save_ice
     from pushplan.scenarios.ice_generator import generate_ice
     from pushplan.scenarios.office import generate_office
+    from pushplan.scenarios.rearrangement import generate_rearrangement, load_relopush
 
 __all__ = [
     "FloeSizes",
@@ -25,7 +26,9 @@ __all__ = [
     "Suite",
     "generate_ice",
     "generate_office",
+    "generate_rearrangement",
     "load_ice",
+    "load_relopush",
     "load_scenarios",
     "save_ice",
     "save_scenarios",
@@ -42,5 +45,6 @@ __getattr__, __dir__ = lazy_names(
         "ice_files": "load_ice save_ice",
         "ice_generator": "generate_ice",
         "office": "generate_office",
+        "rearrangement": "generate_rearrangement load_relopush",
     },
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pushplan.world import GoalDisc, GoalLine, InvalidInputError, Movables, World
+from pushplan.world import GoalDisc, GoalLine, InvalidInputError, Movables, ObjectGoals, World
 from pushplan.world.checks import FloatArray
 
 FARTHEST = 1e6
@@ -85,6 +85,8 @@ def _goal_points(world: World) -> FloatArray:
     goal = world.goal
     if isinstance(goal, GoalDisc):
         return goal.center
+    if isinstance(goal, ObjectGoals):
+        return goal.poses[:, :2]
     return goal.point if isinstance(goal, GoalLine) else goal.polygon
 
 

@@ -10,6 +10,7 @@ from pushplan.errors import (
 )
 from pushplan.world.actions import Action, Twist, WheelSpeeds
 from pushplan.world.goals import (
+    AreaGoal,
     ClearanceArea,
     Goal,
     GoalDisc,
@@ -17,6 +18,7 @@ from pushplan.world.goals import (
     GoalPose,
     ManipulationGoal,
     NavigationGoal,
+    ObjectGoals,
     Receptacle,
 )
 from pushplan.world.movables import Movables
@@ -65,6 +67,7 @@ __all__ = [
     "BUMPERS",
     "Action",
     "AnyOf",
+    "AreaGoal",
     "Cancellation",
     "ChecksEnvironment",
     "ChecksScenario",
@@ -89,6 +92,7 @@ __all__ = [
     "MissingDependencyError",
     "Movables",
     "NavigationGoal",
+    "ObjectGoals",
     "OwnBudget",
     "PendingResult",
     "Plan",

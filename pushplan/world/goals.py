@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
-from typing import Annotated
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
@@ -13,6 +13,9 @@ from pushplan.errors import InvalidInputError
 from pushplan.world.checked_fields import CheckedFields, Limits, PositiveFloat, Shape
 from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, IntArray, array, frozen
 from pushplan.world.outline import convex_outline, next_corner, signed_area
+
+if TYPE_CHECKING:
+    from pushplan.world.movables import Movables
 
 Point = Annotated[FloatArray, Shape(2)]
 
@@ -113,8 +116,12 @@ class GoalLine(ArrayRecord, CheckedFields):
         return self.distance(float(pose[0]), float(pose[1])) == 0.0
 
 
-class _ObjectGoal(ArrayRecord, ABC):
-    """A goal for objects."""
+class _AreaGoal(ArrayRecord, ABC):
+    """A goal that objects share: an area that they have to be in, or off."""
+
+    def done(self, movables: Movables) -> BoolArray:
+        """(K,) which objects, as drawn, are where they should be."""
+        return movables.within(self.contains_each)
 
     def contains(self, outline: FloatArray) -> bool:
         """True if an object with this convex outline, (N, 2) corners [m], is where it should be."""
@@ -131,7 +138,7 @@ class _ObjectGoal(ArrayRecord, ABC):
 
 
 @dataclass(frozen=True, eq=False)
-class Receptacle(_ObjectGoal):
+class Receptacle(_AreaGoal):
     """An object is delivered when all its corners are inside ``polygon``.
 
     Args:
@@ -155,7 +162,7 @@ class Receptacle(_ObjectGoal):
 
 
 @dataclass(frozen=True, eq=False)
-class ClearanceArea(_ObjectGoal):
+class ClearanceArea(_AreaGoal):
     """An object is cleared when its outline no longer touches ``polygon``.
 
     Args:
@@ -204,6 +211,117 @@ def _gaps(a: FloatArray, b: FloatArray, points: FloatArray) -> FloatArray:
     return gaps
 
 
+@dataclass(frozen=True, eq=False)
+class ObjectGoals(ArrayRecord, CheckedFields):
+    """A place for each of some objects; the others may be anywhere in the end.
+
+    Args:
+        ids: (G,) the objects, by their distinct ids.
+        poses: (G, 3) where each belongs: x, y [m], theta [rad], world frame.
+        radii: (G,) tolerances of the positions [m], positive.
+        heading_tolerances: (G,) to either side [rad], positive, at most π, which takes any heading.
+        symmetries: (G,) how many headings, evenly spread over a turn, are the same to each object:
+            4 for a square without a front; 1 for all by default.
+        groups: (G,) objects of one number may take one another's places; by default each has a
+            number of its own.
+        robot: where the robot has to be once all objects are done; anywhere if None.
+    """
+
+    field_prefix = "goal."
+
+    ids: Annotated[IntArray, Shape("G")]
+    poses: Annotated[FloatArray, Shape("G", 3)]
+    radii: Annotated[FloatArray, Shape("G")]
+    heading_tolerances: Annotated[FloatArray, Shape("G")]
+    symmetries: Annotated[IntArray, Shape("G")] = field(
+        default_factory=lambda: np.zeros(0, dtype=np.int64)
+    )
+    groups: Annotated[IntArray, Shape("G")] = field(
+        default_factory=lambda: np.zeros(0, dtype=np.int64)
+    )
+    robot: GoalDisc | None = None
+
+    def __post_init__(self) -> None:
+        count = len(array("goal.ids", self.ids, (None,), dtype=np.int64))
+        for name, default in (("symmetries", np.ones(count)), ("groups", np.arange(count))):
+            if getattr(self, name) is None or np.array_equal(getattr(self, name), []):
+                object.__setattr__(self, name, default.astype(np.int64))
+        super().__post_init__()
+        if not count:
+            raise InvalidInputError("goal.ids must name at least one object")
+        if len(np.unique(self.ids)) != count:
+            raise InvalidInputError(f"goal.ids must be distinct, got {self.ids.tolist()}")
+        for name, low, high in (
+            ("radii", 0.0, math.inf),
+            ("heading_tolerances", 0.0, math.pi),
+            ("symmetries", 0, 360),
+        ):
+            values = getattr(self, name)
+            wrong = values[~((values > low) & (values <= high))]
+            if len(wrong):
+                most = f" and at most {high:g}" if high < math.inf else ""
+                raise InvalidInputError(f"goal.{name} must be positive{most}, got {wrong[0]:g}")
+
+    def wanted(self, ids: IntArray) -> BoolArray:
+        """(K,) which objects have a place."""
+        return np.isin(ids, self.ids)
+
+    def errors(self, poses: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Distance [m] and least turn [rad], up to symmetry, from (..., 1 or G, 3) poses."""
+        away = poses - self.poses
+        step = math.tau / self.symmetries
+        turns = np.abs(away[..., 2] - step * np.round(away[..., 2] / step))
+        return np.hypot(away[..., 0], away[..., 1]), turns
+
+    def assigned(self, ids: IntArray, poses: FloatArray) -> IntArray:
+        """(K,) the place of each object, by its number in this goal; -1 for those without one.
+
+        Within a group as many objects as possible are where they belong, and the sum of the other
+        distances is the least.
+
+        Args:
+            ids: (K,) of the objects.
+            poses: (K, 3) of them.
+        """
+        from scipy.optimize import linear_sum_assignment  # takes longer than the rest of this room
+
+        found = np.full(len(ids), -1)
+        rows = {int(label): k for k, label in enumerate(ids)}
+        for group in np.unique(self.groups):
+            places = np.flatnonzero(self.groups == group)
+            objects = [rows[label] for label in self.ids[places].tolist() if label in rows]
+            if len(places) == 1:
+                found[objects] = places[0]
+            elif objects:
+                distances, turns = (
+                    values[:, places] for values in self.errors(poses[objects, None])
+                )
+                missed = (distances > self.radii[places]) | (
+                    turns > self.heading_tolerances[places]
+                )
+                penalty = 1.0 + float(distances.sum())
+                chosen = linear_sum_assignment(np.where(missed, penalty + distances, 0.0))
+                found[np.array(objects)[chosen[0]]] = places[chosen[1]]
+        return found
+
+    def reached(self, ids: IntArray, poses: FloatArray) -> BoolArray:
+        """(K,) which objects are within the tolerances of their places, or have none."""
+        at = self.assigned(ids, poses)
+        done = at < 0
+        k = np.flatnonzero(~done)
+        distances, turns = self.errors(poses[k, None])
+        chosen = np.arange(len(k)), at[k]
+        done[k] = (distances[chosen] <= self.radii[at[k]]) & (
+            turns[chosen] <= self.heading_tolerances[at[k]]
+        )
+        return done
+
+    def done(self, movables: Movables) -> BoolArray:
+        """(K,) which objects are where they should be; those without a place are."""
+        return self.reached(movables.ids, movables.poses)
+
+
 NavigationGoal = GoalDisc | GoalLine
-ManipulationGoal = Receptacle | ClearanceArea
+AreaGoal = Receptacle | ClearanceArea
+ManipulationGoal = AreaGoal | ObjectGoals
 Goal = NavigationGoal | ManipulationGoal

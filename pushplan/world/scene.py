@@ -13,10 +13,12 @@ from pushplan.errors import InvalidInputError
 from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, Shape
 from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray
 from pushplan.world.goals import (
+    AreaGoal,
     Goal,
     GoalPose,
     ManipulationGoal,
     NavigationGoal,
+    ObjectGoals,
 )
 from pushplan.world.movables import Movables
 from pushplan.world.outline import transform
@@ -64,8 +66,8 @@ class World(ArrayRecord, CheckedFields):
         super().__post_init__()
         if not isinstance(self.goal, Goal):
             raise InvalidInputError(
-                "world.goal must be a GoalDisc, GoalPose, GoalLine, Receptacle or ClearanceArea, "
-                f"got {type(self.goal).__name__}"
+                "world.goal must be a GoalDisc, GoalPose, GoalLine, Receptacle, ClearanceArea or "
+                f"ObjectGoals, got {type(self.goal).__name__}"
             )
 
     @property
@@ -112,10 +114,56 @@ class World(ArrayRecord, CheckedFields):
         """
         if not isinstance(self.goal, ManipulationGoal):
             raise InvalidInputError(
-                "this needs a goal for the objects (Receptacle or ClearanceArea), "
+                "this needs a goal for the objects (Receptacle, ClearanceArea or ObjectGoals), "
                 f"got {type(self.goal).__name__}"
             )
         return self.goal
+
+    @property
+    def area_goal(self) -> AreaGoal:
+        """The goal, where it is an area that the objects have to be in, or off.
+
+        Raises:
+            InvalidInputError: if it is another one.
+        """
+        if not isinstance(self.goal, AreaGoal):
+            raise InvalidInputError(
+                "this needs an area for the objects (Receptacle or ClearanceArea), "
+                f"got {type(self.goal).__name__}"
+            )
+        return self.goal
+
+    @property
+    def wanted(self) -> BoolArray:
+        """(K,) whether the goal says anything of each object.
+
+        Raises:
+            InvalidInputError: if the goal is one for the robot.
+        """
+        goal = self.manipulation_goal
+        if isinstance(goal, ObjectGoals):
+            return goal.wanted(self.movables.ids)
+        return np.ones(len(self.movables), dtype=np.bool_)
+
+    @property
+    def goal_polygons(self) -> tuple[FloatArray, ...]:
+        """Convex polygons (N, 2) [m] that show a goal of the objects: its area, or their parts.
+
+        Those of goals of the robot are none.
+        """
+        goal = self.goal
+        if isinstance(goal, AreaGoal):
+            return (goal.polygon,)
+        if not isinstance(goal, ObjectGoals):
+            return ()
+        objects = self.movables
+        rows = {label: k for k, label in enumerate(objects.ids.tolist())}
+        return tuple(
+            transform(pose, part)
+            for label, pose in zip(goal.ids.tolist(), goal.poses, strict=True)
+            if label in rows
+            for part in objects.parts(rows[label])
+        )
 
     @property
     def completed(self) -> BoolArray:
@@ -124,7 +172,7 @@ class World(ArrayRecord, CheckedFields):
         Raises:
             InvalidInputError: if the goal is one for the robot.
         """
-        return self.movables.within(self.manipulation_goal.contains_each)
+        return self.manipulation_goal.done(self.movables)
 
     def believing(self, fixed: ArrayLike) -> World:
         """The same scene with the objects flagged in (K,) held not to move, and no others."""
@@ -143,6 +191,11 @@ class World(ArrayRecord, CheckedFields):
         """True if the robot, or every object, is where the goal wants it."""
         if isinstance(self.goal, NavigationGoal):
             return self.goal.reached_by(self.robot_pose)
+        if isinstance(self.goal, ObjectGoals):
+            robot = self.goal.robot
+            here = robot is None or robot.reached_by(self.robot_pose)
+            if not here or not np.isin(self.goal.ids, self.movables.ids).all():
+                return False
         return bool(self.completed.all())
 
     def robot_outline_world(self) -> tuple[FloatArray, ...]:

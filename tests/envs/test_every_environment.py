@@ -37,6 +37,10 @@ LAYOUTS = {
         for name in ("clear_small", "walled", "walled_with_columns")
     ],
     "room": [{"spread": 0.2}, {"max_speed": 0.1, "control_step": 0.05}],
+    "rearrange": [
+        {"objects": 2, "arrangement": "swapped"},
+        {"objects": 1, "shape": "t", "obstacles": 1, "room": 2.0},
+    ],
     "office": [{"polygons": 200, "boxes": 0.0}, {"polygons": 300, "bumper": "pusher"}],
 }
 
@@ -106,7 +110,8 @@ def comparable(info):
 
 
 def test_every_task_runs_on_both_simulators():
-    tasks = {"maze", "namo", "ship_ice", "box_delivery", "area_clearing", "room", "office"}
+    names = "maze namo ship_ice box_delivery area_clearing room office rearrange"
+    tasks = set(names.split())
     assert {task for task, _ in PAIRS} == tasks
     assert len(PAIRS) == 2 * len(tasks)
 

@@ -117,8 +117,11 @@ class MujocoCamera:
             foot = middle + ((goal.point - middle) @ goal.normal) * goal.normal
             edges = [(foot - reach * along, foot + reach * along)]
         else:
-            corners = goal.polygon
-            edges = list(zip(corners, np.roll(corners, -1, axis=0), strict=True))
+            edges = [
+                edge
+                for corners in world.goal_polygons
+                for edge in zip(corners, np.roll(corners, -1, axis=0), strict=True)
+            ]
             if isinstance(goal, ClearanceArea):
                 edges = [e for e, is_open in zip(edges, goal.open_edges, strict=True) if is_open]
         for a, b in edges:

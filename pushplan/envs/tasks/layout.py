@@ -14,8 +14,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from pushplan.envs.tasks.object_shapes import objects_of_many_shapes
 from pushplan.envs.tasks.presets import Preset
-from pushplan.geometry import GeodesicField
-from pushplan.world import Movables, Receptacle, RobotModel, ScenarioError, StaticMap
+from pushplan.geometry import GeodesicField, geodesic_field
+from pushplan.geometry.object_ways import shared_ways
+from pushplan.world import (
+    AreaGoal,
+    GoalDisc,
+    ManipulationGoal,
+    Movables,
+    Receptacle,
+    RobotModel,
+    ScenarioError,
+    StaticMap,
+)
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 from pushplan.world.outline import transform, transform_outlines
 
@@ -322,14 +332,35 @@ def place_boxes(
     )
 
 
-def goal_distances(field: GeodesicField, poses: FloatArray) -> FloatArray:
-    """(K,) shortest way of each object's centre to the goal [m], inf where there is none.
+@dataclass(frozen=True)
+class GoalWays:
+    """Shortest ways of the objects' centres to where a goal wants them, on a grid.
 
     Args:
-        field: of the goal.
-        poses: (K, 3) of the objects.
+        static: obstacles.
+        goal: of the objects.
+        resolution: side of a cell [m].
     """
-    return field.sample_each(poses[:, :2])
+
+    static: StaticMap
+    goal: ManipulationGoal
+    resolution: float
+
+    @cached_property
+    def _fields(self) -> dict[object, GeodesicField]:
+        return {}
+
+    def field(self, goal: AreaGoal | GoalDisc) -> GeodesicField:
+        """The distances to an area, or to the place of an object."""
+        if goal not in self._fields:
+            self._fields[goal] = geodesic_field(self.static, goal, resolution=self.resolution)
+        return self._fields[goal]
+
+    def lengths(self, ids: IntArray, poses: FloatArray) -> FloatArray:
+        """(K,) ways of objects at poses (K, 3) [m], inf where there is none."""
+        return shared_ways(
+            self.goal, ids, poses[:, :2], lambda goal, points: self.field(goal).sample_each(points)
+        )
 
 
 def footprint_at(robot: RobotModel, pose: FloatArray) -> list[Any]:

@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 
 from pushplan.envs.tasks.base import StepOutcome, Task
-from pushplan.envs.tasks.layout import GAP, FreeSpace, footprint_at, goal_distances, place_boxes
+from pushplan.envs.tasks.layout import GAP, FreeSpace, footprint_at, place_boxes
 from pushplan.envs.tasks.variations import Objects, TaskVariations, Yaw
 from pushplan.geometry import GeodesicField, Grid, clearance_field, geodesic_field
 from pushplan.geometry.free_components import FreeComponents
@@ -19,8 +19,8 @@ from pushplan.geometry.grid import nearest_marked
 from pushplan.observation import ImageObservation
 from pushplan.world import (
     BUMPERS,
+    AreaGoal,
     InvalidInputError,
-    ManipulationGoal,
     ScenarioError,
     StaticMap,
     World,
@@ -129,7 +129,7 @@ class ManipulationTask(Task):
     """For each box that was done and is no longer."""
     end_reward: ClassVar[float] = 0.0
 
-    goal: ManipulationGoal
+    goal: AreaGoal
     variations: ManipulationVariations
 
     def _prepare(self) -> None:
@@ -284,7 +284,7 @@ class ManipulationTask(Task):
 
     def goal_distances(self, poses: FloatArray) -> FloatArray:
         """(K,) shortest way of each box centre to the goal [m], from poses (K, 3)."""
-        found = goal_distances(self.field, poses)
+        found = self.field.sample_each(poses[:, :2])
         return np.where(np.isinf(found), self._farthest, found)
 
     def _idle(self, world: World, progress: bool) -> bool:

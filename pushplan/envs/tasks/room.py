@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 
 from pushplan.envs.tasks.base import SUCCESS_REWARD, StepOutcome, Task
-from pushplan.envs.tasks.layout import FreeSpace, goal_distances, those_inside
+from pushplan.envs.tasks.layout import FreeSpace, GoalWays, those_inside
 from pushplan.envs.tasks.presets import read_presets
 from pushplan.envs.tasks.variations import TaskVariations
 from pushplan.geometry.distance_field import geodesic_field
@@ -78,9 +78,10 @@ class RoomTask(Task):
     minus 150 times the work on the objects over the robot's mass, both as fractions of the way from
     the file's start; -50 at a wall or beyond the bounds of the map, +200 at the goal.
 
-    Every object goes into a receptacle, where it leaves the floor, or off an area. Reward: 150
-    times the decrease of the objects' goal distances, as a fraction of those at the file's start;
-    +10 for each object that is done and -10 for each that is no longer, +200 when all are.
+    Every object goes into a receptacle, where it leaves the floor, off an area, or to a place of
+    its own. Reward: 150 times the decrease of the objects' goal distances, as a fraction of those
+    at the file's start; +10 for each object that is done and -10 for each that is no longer, +200
+    when all are.
 
     Goal distances are shortest ways of a point around what is static.
     """
@@ -109,28 +110,33 @@ class RoomTask(Task):
         except InvalidInputError as error:
             raise ScenarioError(f"room: {error}") from error
         objects = world.movables.moved_to(world.movables.poses)  # at rest
-        self._world = replace(world, robot=robot, movables=objects, robot_twist=None, time=0.0)
-        room = world.static.bounds[2:] - world.static.bounds[:2]
-        self.reach = 2.0 * float(np.hypot(*room))
-        self.state_objects = max(self.state_objects, len(objects))
-        self._field = geodesic_field(
-            world.static, world.goal, resolution=float(room.max()) / _CELLS
-        )
-        self._far = float(self._field.values[np.isfinite(self._field.values)].max(initial=0.0))
-        self.goal = world.goal
-        self.objects_leave = isinstance(world.goal, Receptacle)
-        self.goal_kind = world.goal_kind
-        if self.goal_kind == "objects":
-            self._way = self._way_of_objects()
-            is_done = bool(world.completed.all())
-        else:
-            self._way = self._field.exact(*world.robot_pose[:2].tolist())
-            is_done = self._way == 0.0
-        if is_done:
+        self._furnish(replace(world, robot=robot, movables=objects, robot_twist=None, time=0.0))
+        if self._is_done:
             who = "the robot" if self.goal_kind == "robot" else "every object"
             raise ScenarioError(f"room: {who} starts in the goal in {path}")
         if self._way == math.inf:
             raise ScenarioError(f"room: no way leads to the goal in {path}")
+
+    def _furnish(self, world: World) -> None:
+        """Set the world of the starts, and all that follows from it."""
+        self._world = world
+        objects = world.movables
+        room = world.static.bounds[2:] - world.static.bounds[:2]
+        self.reach = 2.0 * float(np.hypot(*room))
+        self._far = float(room.sum())
+        self.state_objects = max(self.state_objects, len(objects))
+        self.goal = world.goal
+        self.objects_leave = isinstance(world.goal, Receptacle)
+        self.goal_kind = world.goal_kind
+        cell = float(room.max()) / _CELLS
+        if self.goal_kind == "objects":
+            self._ways = GoalWays(world.static, world.manipulation_goal, cell)
+            self._way = self._way_of_objects()
+            self._is_done = world.goal_reached
+        else:
+            self._field = geodesic_field(world.static, world.goal, resolution=cell)
+            self._way = self._field.exact(*world.robot_pose[:2].tolist())
+            self._is_done = self._way == 0.0
         self._idle_since = 0
 
     def _way_of_objects(self) -> float:
@@ -141,14 +147,15 @@ class RoomTask(Task):
         if isinstance(self.goal, Receptacle):
             lean = _LEAN * float(objects.radii.min())
             self._mouth = Receptacle(grown_outline(self.goal.polygon, lean))
-        if not any(np.isfinite(self._field.exact(x, y)) for x, y in objects.poses[:, :2].tolist()):
+        ways = self._ways.lengths(objects.ids, objects.poses)
+        if not np.isfinite(ways[self._world.wanted]).any():
             return math.inf
         # 1 m where all centres are there already, but not all corners
         return self._distance(self._world) or 1.0
 
     def _distance(self, world: World) -> float:
         """Summed goal distance of the objects on the floor [m]."""
-        ways = goal_distances(self._field, world.movables.poses)
+        ways = self._ways.lengths(world.movables.ids, world.movables.poses)
         return float(np.minimum(ways, self._far).sum())
 
     @property
@@ -225,7 +232,7 @@ class RoomTask(Task):
             self._idle_since = self._steps
         closer = self._distance(before) - self._distance(after)
         reward = PROGRESS_REWARD * closer / self._way + DONE_REWARD * gained
-        if done.all():
+        if done.all() and after.goal_reached:
             return StepOutcome(reward + SUCCESS_REWARD, True, "done", True, False, done)
         late = self._steps >= self._max_steps
         outcome = StepOutcome(reward, False, "time_limit" if late else "", False, late, done)

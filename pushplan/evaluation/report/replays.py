@@ -94,7 +94,7 @@ def _scene(episode: Episode) -> dict[str, Any]:
     elif isinstance(goal, GoalLine):
         shown = {"kind": "line", "point": _flat(goal.point), "normal": _flat(goal.normal)}
     else:
-        shown = {"kind": "polygon", "points": _flat(goal.polygon)}
+        shown = {"kind": "polygons", "parts": [_flat(part) for part in world.goal_polygons]}
     segments = np.column_stack([world.static.segments, world.static.radii])
     return {
         "bounds": _flat(world.static.bounds),

@@ -220,9 +220,7 @@ def object_cost(world: World, push_weight: float, goal_weight: float) -> ObjectC
     radius = robot.circumscribed_radius
     if len(movables):
         radius = float(movables.radii.max())
-    field = object_field(
-        static, world.manipulation_goal, radius, CLEARANCE * radius, _cell(world, radius)
-    )
+    field = object_field(static, world.area_goal, radius, CLEARANCE * radius, _cell(world, radius))
     done = np.full(len(movables), _DONE * field.cell)
     for k in np.flatnonzero(world.completed).tolist():
         way = float(sample(field, movables.poses[None, k, :2])[0])

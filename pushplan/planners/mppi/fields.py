@@ -10,7 +10,7 @@ import numpy as np
 from pushplan.core import geometry as core
 from pushplan.geometry import GeodesicField, GoalDistances, geodesic_field, goal_distances
 from pushplan.motion.done_places import done_places
-from pushplan.world import ClearanceArea, Goal, ManipulationGoal, Receptacle, StaticMap
+from pushplan.world import AreaGoal, ClearanceArea, Goal, Receptacle, StaticMap
 from pushplan.world.checks import FloatArray, frozen
 
 _INSET = 1.05  # distance of an object's middle from the edges of a receptacle when it is done [r]
@@ -54,7 +54,7 @@ def robot_field(static: StaticMap, goal: Goal, clearance: float, cell: float) ->
     return _as_field(field.filled, field)
 
 
-def _places(goal: ManipulationGoal, radius: float) -> ManipulationGoal | list[FloatArray]:
+def _places(goal: AreaGoal, radius: float) -> AreaGoal | list[FloatArray]:
     """Return the places at which the middle of an object is when the object is done."""
     places = done_places(goal, radius, _INSET)
     if not places and isinstance(goal, Receptacle):  # too narrow: as deep as possible
@@ -65,7 +65,7 @@ def _places(goal: ManipulationGoal, radius: float) -> ManipulationGoal | list[Fl
 
 @functools.lru_cache(maxsize=16)
 def object_ways(
-    static: StaticMap, goal: ManipulationGoal, radius: float, clearance: float
+    static: StaticMap, goal: AreaGoal, radius: float, clearance: float
 ) -> GoalDistances:
     """Ways of an object's middle to where it is done, around what is static.
 
@@ -80,7 +80,7 @@ def object_ways(
 
 @functools.lru_cache(maxsize=16)
 def object_field(
-    static: StaticMap, goal: ManipulationGoal, radius: float, clearance: float, cell: float
+    static: StaticMap, goal: AreaGoal, radius: float, clearance: float, cell: float
 ) -> Field:
     """Lengths of `object_ways` on a grid; 0 beyond the edge of a clearance area too."""
     places = _places(goal, radius)

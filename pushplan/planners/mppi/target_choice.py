@@ -85,7 +85,7 @@ class TargetChoice:
 def _way_of_object(world: World, k: int) -> Path:
     """The way of an object to where it is done."""
     radius = float(world.movables.radii[k])
-    ways = object_ways(world.static, world.manipulation_goal, radius, CLEARANCE * radius)
+    ways = object_ways(world.static, world.area_goal, radius, CLEARANCE * radius)
     return ways.path_from(world.movables.poses[k, :2])
 
 

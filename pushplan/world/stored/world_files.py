@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -21,7 +22,15 @@ from pushplan.world.convex_shapes import (
     listed_corners,
     shapes_of,
 )
-from pushplan.world.goals import ClearanceArea, Goal, GoalDisc, GoalLine, GoalPose, Receptacle
+from pushplan.world.goals import (
+    ClearanceArea,
+    Goal,
+    GoalDisc,
+    GoalLine,
+    GoalPose,
+    ObjectGoals,
+    Receptacle,
+)
 from pushplan.world.movables import Movables
 from pushplan.world.robot import RobotModel
 from pushplan.world.scene import World
@@ -56,6 +65,18 @@ _GOALS: dict[str, tuple[type[Any], tuple[str, ...]]] = {
 }
 
 
+_OBJECTS = "objects"
+_PLACE = {
+    "id": "ids",
+    "pose": "poses",
+    "radius": "radii",
+    "heading_tolerance": "heading_tolerances",
+    "symmetry": "symmetries",
+    "group": "groups",
+}
+"""What a file says of the place of an object, and the field of `ObjectGoals` that takes it."""
+
+
 def world_to_dict(world: World) -> dict[str, Any]:
     """The world as plain lists, numbers and texts, ready for JSON or YAML."""
     robot = {key: _plain(getattr(world.robot, key)) for key in _ROBOT_KEYS}
@@ -88,8 +109,6 @@ def world_to_dict(world: World) -> dict[str, Any]:
             for line, radius in zip(world.static.segments, world.static.radii, strict=True)
         ],
     }
-    goal = world.goal
-    kind, keys = next((kind, keys) for kind, (cls, keys) in _GOALS.items() if isinstance(goal, cls))
     return _written(
         {
             "schema": SCHEMA,
@@ -98,9 +117,19 @@ def world_to_dict(world: World) -> dict[str, Any]:
             "robot": _written(robot),
             "static": static,
             "movables": [_written(row) for row in rows],
-            "goal": {"kind": kind, **{key: _plain(getattr(goal, key)) for key in keys}},
+            "goal": _goal_to_dict(world.goal),
         }
     )
+
+
+def _goal_to_dict(goal: Goal) -> dict[str, Any]:
+    if isinstance(goal, ObjectGoals):
+        columns = [_plain(getattr(goal, name)) for name in _PLACE.values()]
+        places = [dict(zip(_PLACE, row, strict=True)) for row in zip(*columns, strict=True)]
+        robot = {} if goal.robot is None else {"robot": _goal_to_dict(goal.robot)}
+        return {"kind": _OBJECTS, "places": places, **robot}
+    kind, keys = next((kind, keys) for kind, (cls, keys) in _GOALS.items() if isinstance(goal, cls))
+    return {"kind": kind, **{key: _plain(getattr(goal, key)) for key in keys}}
 
 
 def _plain(value: Any) -> Any:
@@ -134,13 +163,20 @@ def world_from_dict(data: object, folder: str | Path = ".") -> World:
     if data["schema"] != SCHEMA:
         raise SchemaError(f"this pushplan reads schema {SCHEMA!r}, got {short(data['schema'])}")
     robot, pose, twist = robot_from_dict(data["robot"])
+    movables = movables_from_list(data.get("movables", []))
+    goal = _goal(data["goal"])
+    if isinstance(goal, ObjectGoals):
+        for label in goal.ids[~np.isin(goal.ids, movables.ids)].tolist():
+            raise SchemaError(
+                unknown_name_message("object id", label, map(str, movables.ids.tolist()))
+            )
     return World(
         robot=robot,
         robot_pose=pose,
         robot_twist=twist,
         static=_static(data.get("static", {}), Path(folder)),
-        movables=movables_from_list(data.get("movables", [])),
-        goal=_goal(data["goal"]),
+        movables=movables,
+        goal=goal,
         time=data.get("time", 0.0),
         margin=data.get("margin", 0.0),
     )
@@ -281,12 +317,38 @@ def movables_from_list(data: object) -> Movables:
 
 def _goal(data: object) -> Goal:
     kind = data.get("kind") if isinstance(data, Mapping) else data
-    if not isinstance(data, Mapping) or not isinstance(kind, str) or kind not in _GOALS:
-        raise SchemaError(unknown_name_message("goal kind", kind, _GOALS))
+    kinds = (*_GOALS, _OBJECTS)
+    if not isinstance(data, Mapping) or not isinstance(kind, str) or kind not in kinds:
+        raise SchemaError(unknown_name_message("goal kind", kind, kinds))
+    if kind == _OBJECTS:
+        return _object_goals(data)
     cls, keys = _GOALS[kind]
     known_keys("goal", data, ("kind", *keys), keys)
     goal: Goal = cls(**{key: data[key] for key in keys})
     return goal
+
+
+def _object_goals(data: Mapping[str, Any]) -> ObjectGoals:
+    known_keys("goal", data, ("kind", "places", "robot"), ("places",))
+    robot = _goal(data["robot"]) if "robot" in data else None
+    if not (robot is None or isinstance(robot, GoalDisc)):
+        raise SchemaError("goal.robot must be of kind disc or pose")
+    rows = []
+    for i, place in enumerate(_list("goal.places", data["places"])):
+        name = f"goal.places[{i}]"
+        row = known_keys(name, place, tuple(_PLACE), ("id", "pose", "radius"))
+        row = {"heading_tolerance": math.pi, "symmetry": 1, "group": None, **row}
+        for key in ("id", "symmetry", "group"):
+            row[key] = None if row[key] is None else integer(f"{name}.{key}", row[key])
+        for key in ("radius", "heading_tolerance"):
+            row[key] = number(f"{name}.{key}", row[key], low=0.0, open_low=True)
+        row["pose"] = array(f"{name}.pose", row["pose"], (3,))
+        rows.append(row)
+    free = itertools.count(max((row["group"] or 0 for row in rows), default=0) + 1)
+    for row in rows:  # one that names no group is in one of its own
+        row["group"] = next(free) if row["group"] is None else row["group"]
+    columns: dict[str, Any] = {name: [row[key] for row in rows] for key, name in _PLACE.items()}
+    return ObjectGoals(**columns, robot=robot)
 
 
 def _list(name: str, value: object) -> Sequence[Any]:

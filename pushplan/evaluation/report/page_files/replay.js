@@ -136,7 +136,7 @@ function drawView({ canvas, box, replay }) {
     const [dx, dy] = [size * Math.cos(goal.heading), size * Math.sin(goal.heading)];
     filled([x - 0.35 * dy, y + 0.35 * dx, x + 0.35 * dy, y - 0.35 * dx, x + dx, y + dy], COLOURS.goal);
   }
-  if (goal.kind === "polygon") filled(goal.points, "#009e7322", COLOURS.goal);
+  for (const points of goal.parts ?? []) filled(points, "#009e7322", COLOURS.goal);
   if (goal.kind === "line") {
     const [[px, py], [nx, ny]] = [goal.point, goal.normal];
     const far = x1 - x0 + y1 - y0;

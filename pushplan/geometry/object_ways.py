@@ -1,0 +1,66 @@
+"""How far objects are from where a goal wants them, for goals of all kinds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from pushplan.geometry.shortest_path import goal_distances
+from pushplan.world import AreaGoal, GoalDisc, ManipulationGoal, ObjectGoals, StaticMap
+from pushplan.world.checks import FloatArray, IntArray
+
+Ways = Callable[[AreaGoal | GoalDisc, FloatArray], FloatArray]
+"""From an area or a disc, and (N, 2) points [m], to the (N,) ways from them [m], inf for none."""
+
+
+def object_ways(
+    static: StaticMap, goal: ManipulationGoal, ids: IntArray, places: FloatArray
+) -> FloatArray:
+    """`shared_ways` that are shortest paths of a point around what is static."""
+
+    def ways(goal: AreaGoal | GoalDisc, points: FloatArray) -> FloatArray:
+        distances = goal_distances(static, goal)
+        return np.array([distances.path_from(point).length for point in points])
+
+    return shared_ways(goal, ids, places, ways)
+
+
+def shared_ways(
+    goal: ManipulationGoal, ids: IntArray, places: FloatArray, ways: Ways
+) -> FloatArray:
+    """(K,) way of each object's middle to where it belongs [m], 0 for one that belongs nowhere.
+
+    Objects that may take one another's places share them so that the sum of their ways is least.
+
+    Args:
+        goal: of the objects.
+        ids: (K,) of the objects.
+        places: (K, 2) of their middles [m].
+        ways: lengths of the ways to an area, or to the disc of a place.
+    """
+    if not isinstance(goal, ObjectGoals):
+        return ways(goal, places)
+    found = np.zeros(len(ids))
+    discs = [GoalDisc(*row) for row in zip(goal.poses[:, :2], goal.radii.tolist(), strict=True)]
+    for group in np.unique(goal.groups):
+        own = np.flatnonzero(goal.groups == group)
+        k = np.flatnonzero(np.isin(ids, goal.ids[own]))
+        lengths = np.column_stack([ways(discs[g], places[k]) for g in own.tolist()])
+        found[k] = lengths[np.arange(len(k)), least_pairing(lengths)]
+    return found
+
+
+def least_pairing(costs: FloatArray) -> IntArray:
+    """(N,) column for each row of (N, M >= N) costs, so that their sum is least.
+
+    Costs that are infinite are taken only where a row has no other column left.
+    """
+    if costs.shape[1] == 1:
+        return np.zeros(len(costs), dtype=np.int64)
+    from scipy.optimize import linear_sum_assignment  # takes longer than the rest of this room
+
+    finite = np.isfinite(costs)
+    most = 1.0 + 2.0 * float(np.abs(costs[finite]).sum())
+    columns: IntArray = linear_sum_assignment(np.where(finite, costs, most))[1].astype(np.int64)
+    return columns
