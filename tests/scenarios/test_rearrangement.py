@@ -37,7 +37,9 @@ def test_starts_and_places_are_free(shape, arrangement):
         )
         ids = world.movables.ids
         there = dict(zip(world.goal.ids.tolist(), world.goal.poses, strict=True))
-        poses = np.array([there.get(int(k), p) for k, p in zip(ids, world.movables.poses, strict=False)])
+        poses = np.array(
+            [there.get(int(k), p) for k, p in zip(ids, world.movables.poses, strict=True)]
+        )
         placed = world.moved(movable_poses=poses)
         assert placed.completed.all()
         assert not world.goal_reached
@@ -60,7 +62,7 @@ def test_the_same_seed_draws_the_same_room():
 
 
 def test_too_many_objects_are_refused():
-    with pytest.raises(ScenarioError, match="30 objects do not fit in a room of 1.5 x 1.5 m"):
+    with pytest.raises(ScenarioError, match="30 objects do not fit"):
         generate_rearrangement(np.random.default_rng(0), robot=ROBOT, objects=30, room=(1.5, 1.5))
     for wrong in ({"objects": 0}, {"shape": "z"}, {"arrangement": 3}, {"tolerance": -1.0}):
         with pytest.raises(InvalidInputError, match=next(iter(wrong))):
@@ -79,7 +81,8 @@ def test_instances_of_relopush_are_read(tmp_path):
     file = tmp_path / "instances.json"
     file.write_text(json.dumps([INSTANCE, {**INSTANCE, "robot": [1.0, 2.0, 0.0]}]))
     world = load_relopush(file, 0, robot=ROBOT)
-    assert dict(zip(world.goal.ids.tolist(), world.goal.poses[:, 0].tolist(), strict=False)) == {0: 3.0, 1: 1.0}
+    assert world.goal.ids.tolist() == [0, 1]
+    assert world.goal.poses[:, 0].tolist() == [3.0, 1.0]
     assert load_relopush(file, 3, robot=ROBOT).robot_pose.tolist() == [1.0, 2.0, 0.0]
 
 
