@@ -34,6 +34,7 @@ from pushplan.world.policy_abilities import (
     PlansBesideDriving,
     ShowsPlan,
 )
+from pushplan.world.price_map import PriceMap
 from pushplan.world.protocols import Controller, Planner, Policy
 from pushplan.world.robot import Drive, RobotModel
 from pushplan.world.scene import World
@@ -98,6 +99,7 @@ __all__ = [
     "Planner",
     "PlanningExecutor",
     "PlansBesideDriving",
+    "PriceMap",
     "Policy",
     "PushplanError",
     "Receptacle",
