@@ -238,7 +238,9 @@ class PushplanNode(LifecycleNode):  # type: ignore[misc]
         try:
             found = self._tf.lookup_transform(target, frame, time, wait)
         except tf2_ros.TransformException as error:
-            raise InvalidInputError(f"no transform from {frame!r} to {target!r}: {error}") from error
+            raise InvalidInputError(
+                f"no transform from {frame!r} to {target!r}: {error}"
+            ) from error
         move = found.transform
         place = Point(x=move.translation.x, y=move.translation.y, z=move.translation.z)
         return pose_from(Pose(position=place, orientation=move.rotation))

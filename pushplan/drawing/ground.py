@@ -39,7 +39,7 @@ def draw_ground(canvas: Canvas, static: StaticMap, goal: Goal, palette: Palette)
     if isinstance(goal, GoalDisc):
         canvas.disc(goal.center, goal.radius, fill, edge, 1.5)
         if isinstance(goal, GoalPose):
-            canvas.polygon(heading_arrow(goal, max(goal.radius, canvas.metres(14.0))), edge, edge)
+            canvas.polygon(goal.arrow(max(goal.radius, canvas.metres(14.0))), edge, edge)
     elif isinstance(goal, GoalLine):
         reach = 2.0 * float(np.hypot(*(static.bounds[2:] - static.bounds[:2])))
         along = reach * np.array([-goal.normal[1], goal.normal[0]])
@@ -56,13 +56,6 @@ def draw_ground(canvas: Canvas, static: StaticMap, goal: Goal, palette: Palette)
         canvas.polygon(polygon, palette.wall, palette.wall)
     for line, radius in zip(static.segments, static.radii, strict=True):
         canvas.thick_segment(line, max(float(radius), canvas.metres(1.5)), palette.wall)
-
-
-def heading_arrow(goal: GoalPose, length: float) -> FloatArray:
-    """(3, 2) corners of an arrow head [m] from the middle of a goal along its heading."""
-    ahead = length * np.array([np.cos(goal.heading), np.sin(goal.heading)])
-    aside = 0.35 * np.array([-ahead[1], ahead[0]])
-    return np.array([goal.center + aside, goal.center - aside, goal.center + ahead])
 
 
 def _clearance_area(canvas: Canvas, goal: ClearanceArea, palette: Palette) -> None:

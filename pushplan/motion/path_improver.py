@@ -105,8 +105,10 @@ class PathImprover:
         self.interaction = interaction
         self.contacts = compile_interaction(interaction, world)
         self._jam_length = self._endless_length()
-        price = world.price
-        self._price = price and core.PriceGrid(price.prices, price.origin, price.resolution)
+        self._price = None
+        if world.price is not None:
+            price = world.price
+            self._price = core.PriceGrid(price.prices, price.origin, price.resolution)
         self.room = Room(
             footprint(world.robot),
             obstacles(keep_out(world)),

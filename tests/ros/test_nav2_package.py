@@ -14,6 +14,9 @@ import yaml
 
 import pushplan
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "examples" / "ros2"))
+from navigator import PATH, PLANNERS
+
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "ros2"
 
 PORTS = {
@@ -31,9 +34,6 @@ PORTS = {
 }  # fmt: skip
 """Ports of the nodes that the tree may use: Nav2's from `nav2_behavior_tree/nav2_tree_nodes.xml`
 (ros-navigation/navigation2), those of Jazzy and later; `Sleep` is BehaviorTree.CPP's own."""
-
-sys.path.insert(0, str(EXAMPLE))
-from navigator import PATH, PLANNERS
 
 
 def test_the_behaviour_tree_uses_nodes_and_ports_that_nav2_has() -> None:

@@ -499,7 +499,7 @@ def test_messages_in_other_frames_are_transformed():
 
 def test_a_frame_that_cannot_be_transformed_is_named():
     robot = Robot()
-    with pytest.raises(NavigationError, match="'map', got one in 'odom'.*no tf2") as caught:
+    with pytest.raises(NavigationError, match=r"'map', got one in 'odom'.*no tf2") as caught:
         robot.navigator.compute_path(in_frame("odom"))
     assert caught.value.code == "TF_ERROR"
     robot.scene._pose_of = pose_of

@@ -11,7 +11,7 @@ class TransformException(Exception):
 
 
 class Buffer:
-    def lookup_transform(self, target_frame, source_frame, time, timeout=Duration()):
+    def lookup_transform(self, target_frame, source_frame, time, timeout):
         assert isinstance(time, Time) and isinstance(timeout, Duration)
         if (target_frame, source_frame) != ("map", "odom"):
             raise TransformException(f'"{source_frame}" does not exist')
