@@ -1,4 +1,4 @@
-"""The ROS 2 package ``pushplan_nav2``, for ``colcon build``; it needs ``pip install pushplan``."""
+"""The ROS 2 package ``pushplan_nav2``, for ``colcon build``; pushplan itself comes from pip."""
 
 from glob import glob
 

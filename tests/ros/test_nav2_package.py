@@ -83,7 +83,7 @@ def test_the_package_is_installed_where_ros_2_looks(tmp_path: Path) -> None:
     assert (tmp_path / "share/ament_index/resource_index/packages/pushplan_nav2").is_file()
     assert (share / "package.xml").is_file() and (share / "config" / "pushplan.yaml").is_file()
     assert (share / "behavior_trees" / "navigate_pushing.xml").is_file()
-    assert (share / "launch" / "pushplan.launch.py").is_file()
+    assert (share / "launch" / "pushing.launch.py").is_file()
     scripts = tmp_path / "lib" / "pushplan_nav2"
     assert (scripts / "node.py").stat().st_mode & 0o111  # else `ros2 run` does not see it
     assert {path.name for path in scripts.iterdir()} == {
@@ -119,7 +119,7 @@ def test_the_launch_file_starts_what_the_lifecycle_manager_manages(
         stand_in("launch_ros.actions", "LifecycleNode", "Node"),
     ):
         monkeypatch.setitem(sys.modules, module.__name__, module)
-    found = runpy.run_path(str(EXAMPLE / "launch" / "pushplan.launch.py"))
+    found = runpy.run_path(str(EXAMPLE / "launch" / "pushing.launch.py"))
     (actions,) = found["generate_launch_description"]().given
     kinds = [type(action).__name__ for action in actions]
     declared = {a.given[0] for a, k in zip(actions, kinds, strict=True) if k.startswith("Declare")}

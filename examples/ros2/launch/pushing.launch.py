@@ -1,6 +1,6 @@
 """Start pushplan's node, Nav2's behaviour trees, and the lifecycle manager of both.
 
-    ros2 launch pushplan_nav2 pushplan.launch.py robot:=/path/to/robot.yaml
+    ros2 launch pushplan_nav2 pushing.launch.py robot:=/path/to/robot.yaml
 
 Map, localisation and costmap are those of Nav2's own launch files.
 """
