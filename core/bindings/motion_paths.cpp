@@ -132,19 +132,28 @@ void bind_sweeps(nb::module_& module) {
 }
 
 void bind_problems(nb::module_& module) {
+  nb::class_<PriceGrid>(module, "PriceGrid", "Prices of places.")
+      .def(
+          "__init__",
+          [](PriceGrid* self, const Floats<2>& prices, const OnePose& origin, double cell) {
+            new (self) PriceGrid{view(prices), pose(origin), cell};
+          },
+          "prices"_a.noconvert(), "origin"_a.noconvert(), "cell"_a, nb::keep_alive<1, 2>());
   nb::class_<PathProblem>(module, "PathProblem", "Costs and constraints of a path.")
       .def(
           "__init__",
           [](PathProblem* self, double robot_mass, double push_weight, double turning_radius,
              double spacing, double jam_length, double displacement, const Numbers<5>& goal,
-             const Footprint& footprint, const ConvexObstacles& walls) {
+             const Footprint& footprint, const ConvexObstacles& walls, const PriceGrid* price) {
             new (self)
                 PathProblem{robot_mass,   push_weight,       turning_radius, spacing, jam_length,
                             displacement, goal_region(goal), footprint,      walls};
+            if (price != nullptr) self->price = *price;
           },
           "robot_mass"_a, "push_weight"_a, "turning_radius"_a, "spacing"_a, "jam_length"_a,
-          "displacement"_a, "goal"_a.noconvert(), "footprint"_a, "walls"_a, nb::keep_alive<1, 9>(),
-          nb::keep_alive<1, 10>());
+          "displacement"_a, "goal"_a.noconvert(), "footprint"_a, "walls"_a,
+          "price"_a = nb::none(), nb::keep_alive<1, 9>(), nb::keep_alive<1, 10>(),
+          nb::keep_alive<1, 11>());
   nb::class_<SweptPath>(module, "SweptPath", "A path with the objects that it sweeps.")
       .def(
           "__init__",

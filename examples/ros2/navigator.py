@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import threading
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from scene import NavigationError, Scene
 from pushplan.control import ImmediateExecutor, PoseProgressChecker, Progress, PurePursuit
 from pushplan.planners import PlanFollower, make_planner, planner_names
 from pushplan.planners.following.replanning import Replanning
-from pushplan.ros import Messages, plan_from, pose_from, time_from
+from pushplan.ros import Messages, plan_from, time_from
 from pushplan.runtime import Command, CommandStatus, RunLog, Runner
 from pushplan.world import (
     Deadline,
@@ -187,11 +187,15 @@ class Navigator:
             NavigationError: if it cannot be driven; what was driven before goes on.
         """
         name = self._named("controller", controller_id)
-        frame, robot = self.scene.frame, self.scene.robot
+        robot = self.scene.robot
         try:
-            plan = plan_from(path, robot, frame)
+            plan = plan_from(path, robot)
         except InvalidInputError as error:
             raise NavigationError("INVALID_PATH", str(error)) from error
+        try:
+            plan = replace(plan, poses=self.scene.placed(plan.poses, path))
+        except InvalidInputError as error:
+            raise NavigationError("TF_ERROR", str(error)) from error
         end = self._goal_at(plan.poses[-1])
         # a path may pass its own end, so that the runner is not told of it: see `_has_arrived`
         goal = GoalDisc(end.center + _FAR_AWAY, end.radius) if name == PATH else end
@@ -316,7 +320,7 @@ class Navigator:
 
     def _pose(self, message: Any) -> FloatArray:
         try:
-            return pose_from(message, self.scene.frame)
+            return self.scene.pose(message)
         except InvalidInputError as error:
             raise NavigationError("TF_ERROR", str(error)) from error
 

@@ -1,3 +1,4 @@
+#!/usr/bin/env python3
 """A ROS 2 node that plans paths and drives them, in place of Nav2's planner and controller servers.
 
     python examples/ros2/node.py --ros-args -p robot:=examples/room.yaml -p planner:=push-aware
@@ -7,31 +8,41 @@ docs/ros2.md names topics, actions and parameters.
 
 from __future__ import annotations
 
+import signal
+import sys
 import threading
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import rclpy
 from builtin_interfaces.msg import Duration as DurationMessage
+from geometry_msgs.msg import Point, Pose, TwistStamped
 from geometry_msgs.msg import Twist as TwistMessage
-from geometry_msgs.msg import TwistStamped
 from nav2_msgs.action import ComputePathToPose, FollowPath
 from nav_msgs.msg import OccupancyGrid, Odometry, Path
 from navigator import PATH, NavigationError, Navigator
-from rclpy.action import ActionServer, CancelResponse
-from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.action import ActionServer, CancelResponse, GoalResponse
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.duration import Duration
 from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
-from rclpy.node import Node
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
+from rclpy.time import Time
 from scene import Scene
 from visualization_msgs.msg import MarkerArray
 
-from pushplan.ros import McapLog, Messages, RclpyTypes
+from pushplan.ros import McapLog, Messages, RclpyTypes, pose_from
 from pushplan.runtime import Motors
-from pushplan.world import InvalidInputError, Stop, StopCheck, Twist
+from pushplan.world import InvalidInputError, PushplanError, Stop, StopCheck, Twist
+from pushplan.world.checks import FloatArray
 from pushplan.world.stored.world_files import load_world
+
+try:
+    import tf2_ros
+except ModuleNotFoundError:  # then all messages have to be in one frame
+    tf2_ros = None
 
 
 class CancelRequest(Stop):
@@ -50,82 +61,189 @@ class CancelRequest(Stop):
         return lambda iterations, cost: self.cancelled
 
 
-class PushplanNode(Node):  # type: ignore[misc]
-    """Serves ``compute_path_to_pose`` and ``follow_path``."""
+PARAMETERS = {
+    "autostart": True,
+    "robot": "examples/room.yaml",
+    "frame": "map",
+    "costmap": "",
+    "costmap_price": 2.0,
+    "transform_tolerance": 0.1,
+    "planner": "push-aware",
+    "controller": PATH,
+    "period": 0.05,
+    "budget": 1.0,
+    "tolerance": 0.1,
+    "heading_tolerance": 0.0,
+    "margin": 0.0,
+    "movement_time_allowance": 10.0,
+    "failure_tolerance": 1.0,
+    "max_age": 0.5,
+    "stamped_cmd_vel": False,
+    "log": "",
+}
+"""Parameters with their defaults; docs/ros2.md explains them."""
+
+
+class PushplanNode(LifecycleNode):  # type: ignore[misc]
+    """Serves ``compute_path_to_pose`` and ``follow_path`` while it is active."""
 
     def __init__(self) -> None:
         super().__init__("pushplan")
-        frame, log = self._value("frame", "map"), self._value("log", "")
-        robot = load_world(self._value("robot", "examples/room.yaml")).robot
-        self._scene = Scene(robot, frame=frame, margin=self._value("margin", 0.0))
+        self.declare_parameters("", list(PARAMETERS.items()))
+        self._driving = threading.Lock()
+        self._newest: Any = None
+        self._active = False
+        self._made: list[tuple[Callable[[Any], Any], Any]] = []
+        self._tf: Any = None
+        if tf2_ros is not None:
+            self._tf = tf2_ros.Buffer()
+            self._listener = tf2_ros.TransformListener(self._tf, self)
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Make everything; a parameter that is refused leaves the node unconfigured."""
+        try:
+            self._configure()
+        except (PushplanError, NavigationError, OSError) as error:
+            self.get_logger().error(str(error))
+            return TransitionCallbackReturn.FAILURE
+        return super().on_configure(state)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Accept goals from now on."""
+        self._motors = Motors(
+            self._publish,
+            self._scene.robot,
+            period=self._value("period"),
+            timeout=self._value("max_age"),
+        )
+        done = super().on_activate(state)
+        self._active = True
+        self.get_logger().info("ready")
+        return done
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Accept no more goals, brake the robot and end the goal that it drives to."""
+        self._stand()
+        return super().on_deactivate(state)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Forget everything."""
+        self._release()
+        return super().on_cleanup(state)
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Brake the robot and forget everything."""
+        self.close()
+        return super().on_shutdown(state)
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Brake the robot; the node may be configured again."""
+        return self.on_shutdown(state)
+
+    def _configure(self) -> None:
+        value, frame = self._value, self._value("frame")
+        robot = load_world(value("robot")).robot
+        pose_of = None if self._tf is None else self._pose_of
+        self._scene = Scene(robot, frame=frame, pose_of=pose_of, margin=value("margin"))
         self._messages = Messages(RclpyTypes(), frame_id=frame)
-        self._log = McapLog(log, frame_id=frame) if log else None
-        self._period, max_age = self._value("period", 0.05), self._value("max_age", 0.5)
+        log = McapLog(value("log"), frame_id=frame) if value("log") else None
+        if log is not None:
+            self._made.append((McapLog.close, log))
         self.navigator = Navigator(
             self._scene,
             self._messages,
-            period=self._period,
-            planner=self._value("planner", "push-aware"),
-            controller=self._value("controller", PATH),
-            budget=self._value("budget", 1.0),
-            tolerance=self._value("tolerance", 0.1),
-            heading_tolerance=self._value("heading_tolerance", 0.0),
-            patience=(
-                self._value("movement_time_allowance", 10.0),
-                self._value("failure_tolerance", 1.0),
-            ),
-            max_age=max_age,
-            log=self._log,
+            period=value("period"),
+            planner=value("planner"),
+            controller=value("controller"),
+            budget=value("budget"),
+            tolerance=value("tolerance"),
+            heading_tolerance=value("heading_tolerance"),
+            patience=(value("movement_time_allowance"), value("failure_tolerance")),
+            max_age=value("max_age"),
+            log=log,
         )
-        self._driving = threading.Lock()
-        self._newest: Any = None
+        self._made.append((Navigator.close, self.navigator))
         group = ReentrantCallbackGroup()
+        in_order = MutuallyExclusiveCallbackGroup()
         kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self._stamped = self._value("stamped_cmd_vel", False)
-        velocity = TwistStamped if self._stamped else TwistMessage
-        self._cmd_vel = self.create_publisher(velocity, "cmd_vel", 1)
-        self.motors = Motors(self._publish, robot, period=self._period, timeout=max_age)
-        self._plan = self.create_publisher(Path, "plan", kept)
+        velocity = TwistStamped if value("stamped_cmd_vel") else TwistMessage
+        self._cmd_vel = self.create_lifecycle_publisher(velocity, "cmd_vel", 1)
+        self._plan = self.create_lifecycle_publisher(Path, "plan", kept)
+        self._made += [(self.destroy_lifecycle_publisher, p) for p in (self._cmd_vel, self._plan)]
         # each takes what any publisher offers: best effort, and maps of before or of later on
         sensor = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-        for kind, topic, take, qos in (
-            (OccupancyGrid, "map", self._scene.take_map, kept),
-            (OccupancyGrid, "map", self._scene.take_map, sensor),
-            (Odometry, "odom", self._take_odometry, sensor),
-            (MarkerArray, "objects", self._take_objects, sensor),
+        costmap = value("costmap")
+        grid, take_grid = costmap or "map", self._scene.take_map
+        if costmap:
+            take_grid = partial(self._scene.take_costmap, most=value("costmap_price"))
+        for kind, topic, take, qos, calls in (
+            (OccupancyGrid, grid, take_grid, kept, group),
+            (OccupancyGrid, grid, take_grid, sensor, group),
+            (Odometry, "odom", self._take_odometry, sensor, in_order),
+            (MarkerArray, "objects", self._take_objects, sensor, group),
         ):
-            self.create_subscription(
-                kind, topic, self._checked(topic, take), qos, callback_group=group
+            heard = self.create_subscription(
+                kind, topic, self._checked(topic, take), qos, callback_group=calls
             )
-        self._servers = [
-            ActionServer(
+            self._made.append((self.destroy_subscription, heard))
+        for served, name, execute, accepted in (
+            (ComputePathToPose, "compute_path_to_pose", self._compute_path, _execute),
+            (FollowPath, "follow_path", self._follow_path, self._execute_newest),
+        ):
+            server = ActionServer(
                 self,
-                kind,
+                served,
                 name,
                 execute,
                 callback_group=group,
+                goal_callback=self._is_accepted,
                 handle_accepted_callback=accepted,
                 cancel_callback=lambda _: CancelResponse.ACCEPT,
             )
-            for kind, name, execute, accepted in (
-                (ComputePathToPose, "compute_path_to_pose", self._compute_path, _execute),
-                (FollowPath, "follow_path", self._follow_path, self._execute_newest),
-            )
-        ]
-        self.get_logger().info("ready")
+            self._made.append((ActionServer.destroy, server))
+
+    def _stand(self) -> None:
+        """Brake the robot; its last velocity is zero."""
+        if self._active:
+            self._active = False
+            self.navigator.cancel()  # so that its loop ends
+            self._motors.close()
+            with self._driving:
+                pass  # until the loop has ended
+
+    def _release(self) -> None:
+        while self._made:
+            end, made = self._made.pop()
+            end(made)
 
     def close(self) -> None:
-        """End driving, planning and logging."""
-        self.navigator.cancel()  # so that its loop ends
-        self.navigator.close()
-        if self._log is not None:
-            self._log.close()
+        """Brake the robot and end planning and logging, in whatever state."""
+        self._stand()
+        self._release()
 
-    def _value(self, name: str, default: Any) -> Any:
-        return self.declare_parameter(name, default).value
+    def _is_accepted(self, _: Any) -> GoalResponse:
+        return GoalResponse.ACCEPT if self._active else GoalResponse.REJECT
+
+    def _value(self, name: str) -> Any:
+        return self.get_parameter(name).value
 
     def _now(self) -> float:
         return 1e-9 * float(self.get_clock().now().nanoseconds)
+
+    def _pose_of(self, header: Any) -> FloatArray:
+        """The pose of a header's frame in that of the world, by tf2."""
+        frame, target = header.frame_id, self._scene.frame
+        time = Time.from_msg(header.stamp)  # 0 is the newest
+        wait = Duration(seconds=self._value("transform_tolerance"))
+        try:
+            found = self._tf.lookup_transform(target, frame, time, wait)
+        except tf2_ros.TransformException as error:
+            raise InvalidInputError(
+                f"no transform from {frame!r} to {target!r}: {error}"
+            ) from error
+        move = found.transform
+        place = Point(x=move.translation.x, y=move.translation.y, z=move.translation.z)
+        return pose_from(Pose(position=place, orientation=move.rotation))
 
     def _checked(self, topic: str, take: Callable[[Any], None]) -> Callable[[Any], None]:
         """A callback that says what is wrong with a message, at most once a second."""
@@ -168,6 +286,8 @@ class PushplanNode(Node):  # type: ignore[misc]
     def _follow_path(self, handle: Any) -> Any:
         goal, result = handle.request, FollowPath.Result()
         with self._driving:  # the goal before this one ends first
+            if not self._active:
+                return self._ended(handle, result, "UNKNOWN", "the node is not active")
             try:
                 self.navigator.follow(goal.path, goal.controller_id)
             except NavigationError as error:
@@ -178,14 +298,14 @@ class PushplanNode(Node):  # type: ignore[misc]
 
     def _drive(self, handle: Any) -> tuple[str, str]:
         """The control loop, until the robot stands or another path has come in."""
-        clock, period = self.get_clock(), Duration(seconds=self._period)
+        clock, period = self.get_clock(), Duration(seconds=self._value("period"))
         due, outcome = clock.now(), ("UNKNOWN", "another path has come in")
         try:
             while self.navigator.is_driving and handle is self._newest:
                 if handle.is_cancel_requested:
                     self.navigator.cancel()
                 step = self.navigator.step(self._now())
-                self.motors.drive(step.twist)
+                self._motors.drive(step.twist)
                 handle.publish_feedback(
                     FollowPath.Feedback(distance_to_goal=step.distance, speed=step.twist.linear)
                 )
@@ -194,26 +314,26 @@ class PushplanNode(Node):  # type: ignore[misc]
                 due = min(max(due + period, now), now + period)
                 clock.sleep_until(due)
         except Exception:
-            self.motors.brake()
+            self._motors.brake()
             raise
         return outcome
 
     def _publish(self, twist: Twist) -> None:
-        messages = self._messages
-        stamped = self._stamped
-        self._cmd_vel.publish(
-            messages.twist_stamped(twist, self._now()) if stamped else messages.twist(twist)
-        )
+        if self._value("stamped_cmd_vel"):
+            message = self._messages.twist_stamped(twist, self._now())
+        else:
+            message = self._messages.twist(twist)
+        self._cmd_vel.publish(message)
 
     def _ended(self, handle: Any, result: Any, outcome: str, reason: str) -> Any:
         """The result of a goal, after its state is set."""
         if outcome == "SUCCEEDED":
             handle.succeed()
-        elif outcome == "CANCELED":
+        elif handle.is_cancel_requested and outcome == "CANCELED":
             handle.canceled()
-        else:
+        else:  # canceled by nobody: the node is deactivated
             self.get_logger().warning(f"{outcome}: {reason}")
-            result.error_code = getattr(result, outcome)
+            result.error_code = getattr(result, outcome, result.UNKNOWN)
             if hasattr(result, "error_msg"):  # not in every release of Nav2
                 result.error_msg = reason
             handle.abort()
@@ -227,13 +347,19 @@ def _execute(handle: Any) -> None:
 def main() -> None:
     """Serve until interrupted or terminated; the robot brakes before anything else ends."""
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)  # after its own nothing is sent
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, lambda number, _: sys.exit(128 + number))
     node = PushplanNode()
     executor = MultiThreadedExecutor(8)
     executor.add_node(node)
+    done = TransitionCallbackReturn.SUCCESS
     try:
-        with node.motors:
-            while rclpy.ok():
-                executor.spin_once(timeout_sec=0.1)  # signals are heard in between
+        if node.get_parameter("autostart").value:  # else a lifecycle manager does it
+            if node.trigger_configure() != done:
+                sys.exit("pushplan cannot be configured")
+            node.trigger_activate()
+        while rclpy.ok():
+            executor.spin_once(timeout_sec=0.1)  # signals are heard in between
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     finally:

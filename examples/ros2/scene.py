@@ -4,17 +4,27 @@ from __future__ import annotations
 
 import math
 import threading
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from pushplan.perception import ObjectTracker
-from pushplan.ros import pose_from, static_map_from, time_from
-from pushplan.world import GoalDisc, InvalidInputError, Movables, RobotModel, StaticMap, World
+from pushplan.ros import frame_of, pose_from, price_map_from, static_map_from, time_from
+from pushplan.world import (
+    GoalDisc,
+    InvalidInputError,
+    Movables,
+    PriceMap,
+    RobotModel,
+    StaticMap,
+    World,
+)
 from pushplan.world.checks import FloatArray, expect
 from pushplan.world.outline import transform
 
 _AHEAD = 0.5  # by which stamps of objects may be ahead of the clock [s]
+_LETHAL = 100  # value of a costmap's cells that are obstacles
 _CUBE = 1  # type of a visualization_msgs/Marker whose outline is its scale
 
 
@@ -36,7 +46,10 @@ class Scene:
 
     Args:
         robot: footprint, mass and limits.
-        frame: that all messages have to be in.
+        frame: of the world.
+        pose_of: the pose (3,) in that frame of the frame of a ``std_msgs/Header``, at its stamp; it
+            raises `InvalidInputError` where that is not known. Without it all messages have to be
+            in ``frame``; maps have to in any case.
         margin: distance that plans keep from what is static [m].
         tracker: keeps identity and shape of the objects.
     """
@@ -46,13 +59,16 @@ class Scene:
         robot: RobotModel,
         *,
         frame: str = "map",
+        pose_of: Callable[[Any], FloatArray] | None = None,
         margin: float = 0.0,
         tracker: ObjectTracker | None = None,
     ) -> None:
         self.robot, self.frame, self.margin = expect("robot", robot, RobotModel), frame, margin
+        self._pose_of = pose_of
         self._tracker = ObjectTracker() if tracker is None else tracker
         self._lock = threading.Lock()
         self._static: StaticMap | None = None
+        self._price: PriceMap | None = None
         self._movables = Movables.empty()
         self._objects_at = -math.inf
         self._robot: tuple[FloatArray, FloatArray, float] | None = None
@@ -63,9 +79,42 @@ class Scene:
         if static != self._static:
             self._static = static
 
+    def take_costmap(self, message: Any, most: float) -> None:
+        """Take a costmap of Nav2 as ``nav_msgs/OccupancyGrid``, in place of a map.
+
+        Args:
+            message: lethal cells (100) and unknown ones are obstacles, others have a price.
+            most: price of a cell of 99; see `pushplan.world.PriceMap`.
+        """
+        static = static_map_from(message, self.frame, occupied=_LETHAL)
+        self._price = price_map_from(message, self.frame, most=most)
+        if static != self._static:
+            self._static = static
+
+    def pose(self, message: Any) -> FloatArray:
+        """(3,) pose in the world frame of a message with a header and a pose.
+
+        Raises:
+            InvalidInputError: if it has none, or its frame cannot be transformed.
+        """
+        return self.placed(pose_from(message)[None], message)[0]
+
+    def placed(self, poses: FloatArray, message: Any) -> FloatArray:
+        """Poses (N, 3) in the frame of a message, in the world frame."""
+        frame = frame_of(message)
+        if frame == self.frame:
+            return poses
+        if self._pose_of is None:
+            raise InvalidInputError(
+                f"a message must be in frame {self.frame!r}, got one in {frame!r}, and there is no "
+                "tf2 to transform it"
+            )
+        origin = self._pose_of(message.header)
+        return np.column_stack([transform(origin, poses[:, :2]), origin[2] + poses[:, 2]])
+
     def take_odometry(self, message: Any) -> None:
-        """Take a ``nav_msgs/Odometry``: pose in the world frame, velocity in the body frame."""
-        pose, twist = pose_from(message, self.frame), message.twist.twist
+        """Take a ``nav_msgs/Odometry``, whose velocity is in the body frame."""
+        pose, twist = self.pose(message), message.twist.twist
         c, s = math.cos(pose[2]), math.sin(pose[2])
         x, y = float(twist.linear.x), float(twist.linear.y)
         velocity = np.array([c * x - s * y, s * x + c * y, float(twist.angular.z)])
@@ -101,7 +150,7 @@ class Scene:
             corners = 0.5 * box * [marker.scale.x, marker.scale.y]
         else:
             corners = np.reshape([[p.x, p.y] for p in marker.points], (-1, 2))
-        return transform(pose_from(marker, self.frame), corners)
+        return transform(self.pose(marker), corners)
 
     def world(self, goal: GoalDisc) -> World:
         """Everything as it is known now.
@@ -124,4 +173,5 @@ class Scene:
             goal=goal,
             time=time,
             margin=self.margin,
+            price=self._price,
         )

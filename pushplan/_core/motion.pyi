@@ -107,10 +107,15 @@ class CollisionChecker:
 
     def depth(self, pose: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)]) -> float: ...
 
+class PriceGrid:
+    """Prices of places."""
+
+    def __init__(self, prices: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], origin: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], cell: float) -> None: ...
+
 class PathProblem:
     """Costs and constraints of a path."""
 
-    def __init__(self, robot_mass: float, push_weight: float, turning_radius: float, spacing: float, jam_length: float, displacement: float, goal: Annotated[NDArray[numpy.float64], dict(shape=(5), order='C', device='cpu', writable=False)], footprint: Footprint, walls: ConvexObstacles) -> None: ...
+    def __init__(self, robot_mass: float, push_weight: float, turning_radius: float, spacing: float, jam_length: float, displacement: float, goal: Annotated[NDArray[numpy.float64], dict(shape=(5), order='C', device='cpu', writable=False)], footprint: Footprint, walls: ConvexObstacles, price: PriceGrid | None = None) -> None: ...
 
 class SweptPath:
     """A path with the objects that it sweeps."""

@@ -48,7 +48,7 @@ def draw_ground(canvas: Canvas, static: StaticMap, goal: Goal, palette: Palette)
     if isinstance(goal, GoalDisc):
         canvas.disc(goal.center, goal.radius, fill, edge, 1.5)
         if isinstance(goal, GoalPose):
-            canvas.polygon(arrow_head(goal.pose, max(goal.radius, canvas.metres(14.0))), edge, edge)
+            canvas.polygon(goal.arrow(max(goal.radius, canvas.metres(14.0))), edge, edge)
     elif isinstance(goal, GoalLine):
         reach = 2.0 * float(np.hypot(*(static.bounds[2:] - static.bounds[:2])))
         along = reach * np.array([-goal.normal[1], goal.normal[0]])
@@ -74,13 +74,6 @@ def draw_ground(canvas: Canvas, static: StaticMap, goal: Goal, palette: Palette)
         canvas.polygon(polygon, palette.wall, palette.wall)
     for line, radius in zip(static.segments, static.radii, strict=True):
         canvas.thick_segment(line, max(float(radius), canvas.metres(1.5)), palette.wall)
-
-
-def arrow_head(pose: FloatArray, length: float) -> FloatArray:
-    """(3, 2) corners of an arrow head [m] from a pose (3,) along its heading."""
-    ahead = length * np.array([np.cos(pose[2]), np.sin(pose[2])])
-    aside = 0.35 * np.array([-ahead[1], ahead[0]])
-    return np.array([pose[:2] + aside, pose[:2] - aside, pose[:2] + ahead])
 
 
 def _clearance_area(canvas: Canvas, goal: ClearanceArea, palette: Palette) -> None:

@@ -105,6 +105,10 @@ class PathImprover:
         self.interaction = interaction
         self.contacts = compile_interaction(interaction, world)
         self._jam_length = self._endless_length()
+        self._price = None
+        if world.price is not None:
+            price = world.price
+            self._price = core.PriceGrid(price.prices, price.origin, price.resolution)
         self.room = Room(
             footprint(world.robot),
             obstacles(keep_out(world)),
@@ -184,6 +188,8 @@ class PathImprover:
         world = self.world
         extent = float((world.static.bounds[2:] - world.static.bounds[:2]).sum())
         load = self.config.push_weight * float(world.movables.masses.sum()) / world.robot.mass
+        if world.price is not None:
+            load += float(world.price.prices.max(initial=0.0))
         return _BEYOND * (extent + self.size) * (1.0 + load)
 
     @property
@@ -200,6 +206,7 @@ class PathImprover:
             goal=self._goal_of_paths,
             footprint=room.footprint,
             walls=room.walls,
+            price=self._price,
         )
 
     @property

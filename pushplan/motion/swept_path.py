@@ -16,7 +16,7 @@ class SweptPath(NamedTuple):
     poses: FloatArray  # (M, 3)
     curvatures: FloatArray  # (M,) curvature of the arc that leads to each pose [1/m]
     objects: FloatArray  # (M, K, 3) where the objects are when the robot is at each pose
-    lengths: FloatArray  # (M,) path length so far [m]
+    lengths: FloatArray  # (M,) path length so far, at its price [m]
     works: FloatArray  # (M,) interaction work so far [kg m]
 
     def view(self) -> core.SweptPath:

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.drawing.ground import arrow_head
 from pushplan.ros.ros_messages import Messages
 from pushplan.world import GoalDisc, GoalPose, World
 from pushplan.world.checks import FloatArray
@@ -33,9 +32,9 @@ def scene_markers(messages: Messages, world: World) -> Any:
         area = [goal.center + goal.radius * np.stack([np.cos(_CIRCLE), np.sin(_CIRCLE)], axis=1)]
         if isinstance(goal, GoalPose):
             size = max(goal.radius, 0.5 * world.robot.circumscribed_radius)
-            area.append(arrow_head(goal.pose, size))
-    else:
-        area = list(world.goal_polygons)
+            area.append(goal.arrow(size))
+    elif isinstance(goal, ManipulationGoal):
+        area = [goal.polygon]
     base = messages.base_frame
     frame = messages.frame_id
     time = world.time

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pushplan.world import Drive, InvalidInputError, Plan, RobotModel, StaticMap, Twist
+from pushplan.world import Drive, InvalidInputError, Plan, PriceMap, RobotModel, StaticMap, Twist
 from pushplan.world.checks import FloatArray, array
 from pushplan.world.polyline import arc_lengths, goes_back, path_length
 
@@ -184,6 +184,29 @@ def static_map_from(
         InvalidInputError: if it is another message, in another frame, its data have not the size
             that it states, or are refused.
     """
+    cells, side, origin = _grid(message, frame)
+    return StaticMap.from_occupancy(cells, side, origin, occupied=occupied, unknown=unknown)
+
+
+def price_map_from(message: Any, frame: str | None = None, *, most: float) -> PriceMap:
+    """The prices of a costmap of Nav2, which is a ``nav_msgs/OccupancyGrid``.
+
+    What is lethal in it (100) is `static_map_from`'s, with ``occupied=100``.
+
+    Args:
+        message: the costmap.
+        frame: the frame that it has to be in; any if None.
+        most: see `PriceMap.from_costmap`.
+
+    Raises:
+        InvalidInputError: as `static_map_from`.
+    """
+    cells, side, origin = _grid(message, frame)
+    return PriceMap.from_costmap(cells, side, origin, most=most)
+
+
+def _grid(message: Any, frame: str | None) -> tuple[NDArray[np.int8], float, FloatArray]:
+    """(rows, columns) cells, their side [m], and (3,) their origin."""
     _expect(message, "nav_msgs/OccupancyGrid")
     _in_frame(message, frame)
     height = int(message.info.height)
@@ -196,9 +219,7 @@ def static_map_from(
         )
     side = float(str(np.float32(message.info.resolution)))  # 0.05 is meant, not 0.0500000007
     origin = pose_from(message.info.origin)
-    return StaticMap.from_occupancy(
-        cells.reshape(height, width), side, origin, occupied=occupied, unknown=unknown
-    )
+    return cells.reshape(height, width), side, origin
 
 
 def _heading(q: Any) -> float:

@@ -36,6 +36,7 @@ from pushplan.world.policy_abilities import (
     PlansBesideDriving,
     ShowsPlan,
 )
+from pushplan.world.price_map import PriceMap
 from pushplan.world.protocols import Controller, Planner, Policy
 from pushplan.world.robot import Drive, RobotModel
 from pushplan.world.scene import World
@@ -103,6 +104,7 @@ __all__ = [
     "PlanningExecutor",
     "PlansBesideDriving",
     "Policy",
+    "PriceMap",
     "PushplanError",
     "Receptacle",
     "RobotModel",

@@ -78,6 +78,12 @@ class GoalPose(GoalDisc):
         turned = abs(self.heading_error(float(pose[2]))) <= self.heading_tolerance
         return turned and super().reached_by(pose)
 
+    def arrow(self, length: float) -> FloatArray:
+        """(3, 2) corners of an arrow head [m] from the middle along the heading, to draw it."""
+        ahead = length * np.array([np.cos(self.heading), np.sin(self.heading)])
+        aside = 0.35 * np.array([-ahead[1], ahead[0]])
+        return np.array([self.center + aside, self.center - aside, self.center + ahead])
+
 
 @dataclass(frozen=True, eq=False)
 class GoalLine(ArrayRecord, CheckedFields):

@@ -22,6 +22,7 @@ from pushplan.world.goals import (
 )
 from pushplan.world.movables import Movables
 from pushplan.world.outline import transform
+from pushplan.world.price_map import PriceMap
 from pushplan.world.robot import RobotModel
 from pushplan.world.static_map import StaticMap
 
@@ -44,6 +45,7 @@ class World(ArrayRecord, CheckedFields):
         time: [s].
         margin: distance that the robot keeps from what is static where it can [m]. A robot that
             is nearer may drive on and away; see `pushplan.motion.keep_out`.
+        price: places that cost more to drive through. Files and logs leave it out.
 
     Raises:
         InvalidInputError: if a member has the wrong type or shape or is not finite.
@@ -59,6 +61,7 @@ class World(ArrayRecord, CheckedFields):
     robot_twist: Triple | None = None
     time: float = 0.0
     margin: NonNegativeFloat = 0.0
+    price: PriceMap | None = None
 
     def __post_init__(self) -> None:
         if self.robot_twist is None:

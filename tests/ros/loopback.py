@@ -17,6 +17,8 @@ import numpy as np
 import rclpy
 from action_msgs.msg import GoalStatus
 from geometry_msgs.msg import Twist
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
 from nav2_msgs.action import ComputePathToPose, FollowPath
 from nav_msgs.msg import OccupancyGrid, Odometry, Path
 from rclpy.action import ActionClient
@@ -44,7 +46,7 @@ class Robot(Node):
         self.create_subscription(Path, "plan", self.count, kept)
         self.odometry = self.create_publisher(Odometry, "odom", 1)
         self.objects = self.create_publisher(MarkerArray, "objects", 1)
-        self.map = self.create_publisher(OccupancyGrid, "map", kept)
+        self.map = self.create_publisher(OccupancyGrid, "global_costmap/costmap", kept)
         grid = np.zeros((60, 80), dtype=int)
         grid[[0, -1]] = grid[:38, 39:41] = 100
         grid[:, [0, -1]] = 100
@@ -69,8 +71,9 @@ class Robot(Node):
         self.pose[2] += turn / RATE
         heading = np.array([math.cos(self.pose[2]), math.sin(self.pose[2])])
         self.pose[:2] += speed / RATE * heading
-        message = Odometry(header=MESSAGES.header(self.now()), child_frame_id="base_link")
-        message.pose.pose = MESSAGES.pose(self.pose)
+        header = MESSAGES.header(self.now(), "odom")
+        message = Odometry(header=header, child_frame_id="base_link")
+        message.pose.pose = MESSAGES.pose(self.pose - [0.5, -0.25, 0.0])
         message.twist.twist.linear.x, message.twist.twist.angular.z = speed, turn
         self.odometry.publish(message)
 
@@ -88,6 +91,8 @@ def main():
     drive = ActionClient(robot, FollowPath, "follow_path")
     executor = MultiThreadedExecutor(4)
     executor.add_node(robot)
+    change = robot.create_client(ChangeState, "pushplan/change_state")
+    state = robot.create_client(GetState, "pushplan/get_state")
     spinning = threading.Thread(target=executor.spin, daemon=True)
     spinning.start()
     assert plan.wait_for_server(600.0) and drive.wait_for_server(10.0)
@@ -101,8 +106,9 @@ def main():
         }[result.status]
         return {"status": status, "code": result.result.error_code, **more}
 
-    def computed(name, x, y, **fields):
+    def computed(name, x, y, *, frame="map", **fields):
         goal = ComputePathToPose.Goal(goal=MESSAGES.pose_stamped((x, y, 0.0), 0.0), **fields)
+        goal.goal.header.frame_id = frame
         began = time.monotonic()
         result = plan.send_goal(goal)
         report[name] = told(result, seconds=time.monotonic() - began)
@@ -173,6 +179,42 @@ def main():
     _, future = sent(computed("stuck plan", 1.0, 0.75))
     report["stuck"] = told(wait(future), last=last_twist())
     report["robot"] = {"commands": robot.told, "plans": robot.paths}
+    # frames
+    computed("goal in odom", 2.5, 2.45, frame="odom")
+    computed("goal in camera", 3.0, 2.2, frame="camera")
+
+    # what a lifecycle manager does, while the robot drives and while it stands
+    def changed(transition):
+        request = ChangeState.Request(transition=Transition(id=transition))
+        assert wait(change.call_async(request)).success
+        return wait(state.call_async(GetState.Request())).current_state.label
+
+    robot.drives = True
+    _, future = sent(computed("interrupted plan", 3.0, 2.2))
+    before = under_way(0.3)
+    states = [changed(Transition.TRANSITION_DEACTIVATE)]
+    report["interrupted"] = told(wait(future), before=before, last=last_twist())
+    told_before = robot.told
+    refused = wait(drive.send_goal_async(FollowPath.Goal(path=path))).accepted
+    refused |= wait(plan.send_goal_async(ComputePathToPose.Goal())).accepted
+    time.sleep(0.5)
+    report["inactive"] = {"accepted": refused, "commands": robot.told - told_before}
+    for transition in (
+        Transition.TRANSITION_ACTIVATE,
+        Transition.TRANSITION_DEACTIVATE,
+        Transition.TRANSITION_CLEANUP,
+        Transition.TRANSITION_CONFIGURE,
+        Transition.TRANSITION_ACTIVATE,
+    ):
+        states.append(changed(transition))
+    report["states"] = states
+    end = time.monotonic() + 60.0
+    assert plan.wait_for_server(10.0) and drive.wait_for_server(10.0)
+    while not (path := computed("again", 1.0, 0.75)).poses:  # the map is to come in
+        assert time.monotonic() < end, report["again"]
+        time.sleep(0.2)
+    _, future = sent(path)
+    report["driven again"] = told(wait(future), off=math.dist(robot.pose[:2], (1.0, 0.75)))
     # the node is terminated while the robot drives
     robot.drives = True
     sent(computed("last", 3.0, 2.2))

@@ -26,10 +26,11 @@ WHEELS = (
     "catkin-pkg",
     *(f"ros-jazzy-{name}" for name in ("rclpy", "rmw-fastrtps-cpp", "nav-msgs", "geometry-msgs")),
     "ros-jazzy-visualization-msgs",
+    "ros-jazzy-lifecycle-msgs",
 )
 ENVIRONMENT = {
     **{k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "LD_LIBRARY_PATH"))},
-    "PYTHONPATH": str(ROOT),
+    "PYTHONPATH": os.pathsep.join([str(ROOT), str(Path(__file__).parent / "stand_ins")]),
     "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
     "ROS_DOMAIN_ID": str(os.getpid() % 100),
 }
@@ -68,7 +69,7 @@ def python(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_robot_is_driven_through_navs_actions(python: Path, tmp_path: Path) -> None:
     log = tmp_path / "robot.mcap"
     options = [f"robot:={ROOT}/examples/room.yaml", "planner:=straight", f"log:={log}"]
-    options += ["movement_time_allowance:=3.0"]
+    options += ["costmap:=global_costmap/costmap", "movement_time_allowance:=3.0"]
     words = [str(python), str(EXAMPLE / "node.py"), "--ros-args"]
     words += [word for option in options for word in ("-p", option)]
     with (tmp_path / "node.txt").open("w") as said:
@@ -99,6 +100,12 @@ def test_a_robot_is_driven_through_navs_actions(python: Path, tmp_path: Path) ->
         "empty path": ("aborted", 103),  # INVALID_PATH
         "stuck plan": ("succeeded", 0),
         "stuck": ("aborted", 105),  # FAILED_TO_MAKE_PROGRESS
+        "goal in odom": ("succeeded", 0),
+        "goal in camera": ("aborted", 202),  # TF_ERROR
+        "interrupted plan": ("succeeded", 0),
+        "interrupted": ("aborted", 100),  # UNKNOWN: canceled by no client
+        "again": ("succeeded", 0),
+        "driven again": ("succeeded", 0),
         "last": ("succeeded", 0),
     }
     speeds = told["terminated"]["speeds"]
@@ -111,5 +118,10 @@ def test_a_robot_is_driven_through_navs_actions(python: Path, tmp_path: Path) ->
     assert driven["distances"][0] > 2.0 and driven["distances"][1] < 0.1
     assert canceled["before"] > 0.15 and canceled["last"] == [0.0, 0.0]
     assert told["robot"] == {"commands": told["robot"]["commands"], "plans": 5}
+    assert told["interrupted"]["before"] > 0.15 and told["interrupted"]["last"] == [0.0, 0.0]
+    assert told["inactive"] == {"accepted": False, "commands": 0}
+    active, inactive = "active", "inactive"
+    assert told["states"] == [inactive, active, inactive, "unconfigured", inactive, active]
+    assert told["driven again"]["off"] <= 0.1
     episode = load_episode(log)
     assert len(episode.times) > 500 and episode.world.movables.ids.tolist() == [4]

@@ -432,6 +432,85 @@ def test_markers_become_objects_that_keep_their_ids():
         )
 
 
+def costmap():
+    """The room as a costmap of Nav2: what lies within 0.6 m of the middle wall has a price."""
+    grid = np.zeros((60, 80), dtype=int)
+    grid[:50, 28:52] = 60
+    grid[:38, 38:42] = 99
+    walls = np.reshape(room().data, grid.shape)
+    return MESSAGES.occupancy(np.where(walls == 100, 100, grid), 0.05)
+
+
+def test_lethal_cells_of_a_costmap_are_walls_and_others_a_price():
+    robot = Robot(planner="push-aware")
+    robot.scene.take_costmap(costmap(), most=5.0)
+    world = robot.scene.world(robot.navigator._goal_at(np.array([3.0, 0.75, 0.0])))
+    plain = Robot().scene.world(world.goal)
+    assert world.static == plain.static
+    assert world.price.prices.max() == 5.0 and world.price.prices[45, 40] > 0.0
+    _, poses = path_from(robot.path(3.0, 0.75), "map")
+    at_wall = poses[np.abs(poses[:, 0] - 2.0) < 0.1]
+    assert len(at_wall) and (at_wall[:, 1] > 1.9).all()
+
+
+ODOM = np.array([0.5, -0.25, 0.6])
+"""Pose of the frame ``odom`` in ``map``."""
+
+
+def pose_of(header):
+    if header.frame_id != "odom":
+        raise InvalidInputError(f"no transform from {header.frame_id!r} to 'map'")
+    return ODOM
+
+
+def in_odom(pose):
+    """A pose of the map as it is in ``odom``."""
+    c, s = math.cos(ODOM[2]), math.sin(ODOM[2])
+    dx, dy = pose[0] - ODOM[0], pose[1] - ODOM[1]
+    return np.array([c * dx + s * dy, c * dy - s * dx, pose[2] - ODOM[2]])
+
+
+def test_messages_in_other_frames_are_transformed():
+    robot = Robot()
+    plain = robot.scene.world(robot.navigator._goal_at(np.array([3.0, 0.75, 0.0])))
+    robot.scene._pose_of = pose_of
+    message = odometry(in_odom(robot.pose), Twist(0.2, 0.1), robot.now)
+    message.header.frame_id = "odom"
+    robot.scene.take_odometry(message)
+    box = marker(7, in_odom((1.5, 1.0, 0.3)), cube=0.2, frame="odom")
+    robot.scene.take_objects(
+        MESSAGES.make("visualization_msgs/MarkerArray", markers=[box]), robot.now
+    )
+    world = robot.scene.world(plain.goal)
+    np.testing.assert_allclose(world.robot_pose, plain.robot_pose, atol=1e-12)
+    np.testing.assert_allclose(world.robot_twist, [0.2, 0.0, 0.1], atol=1e-12)
+    np.testing.assert_allclose(world.movables.poses[0, :2], [1.5, 1.0], atol=1e-12)
+    goal = MESSAGES.pose_stamped(in_odom((3.0, 2.2, 0.0)), 0.0)
+    goal.header.frame_id = "odom"
+    assert math.dist(path_from(robot.navigator.compute_path(goal)[0])[1][-1, :2], (3.0, 2.2)) < 0.1
+    path, _ = given_path([in_odom((1.0, 0.75, 0.0))[:2], in_odom((1.0, 2.0, 0.0))[:2]])
+    for part in (path, *path.poses):
+        part.header.frame_id = "odom"
+    robot.see()
+    robot.navigator.follow(path)
+    assert robot.drive()[-1].outcome == "SUCCEEDED"
+    assert math.dist(robot.pose[:2], (1.0, 2.0)) <= 0.1
+
+
+def test_a_frame_that_cannot_be_transformed_is_named():
+    robot = Robot()
+    with pytest.raises(NavigationError, match=r"'map', got one in 'odom'.*no tf2") as caught:
+        robot.navigator.compute_path(in_frame("odom"))
+    assert caught.value.code == "TF_ERROR"
+    robot.scene._pose_of = pose_of
+    with pytest.raises(NavigationError, match="no transform from 'camera' to 'map'"):
+        robot.navigator.compute_path(in_frame("camera"))
+    path, _ = given_path([(1, 0.75), (1, 2)])
+    for part in (path, *path.poses):
+        part.header.frame_id = "camera"
+    assert code_of(lambda: robot.navigator.follow(path)) == "TF_ERROR"
+
+
 STAMPS = iter(range(1, 10**6))
 
 

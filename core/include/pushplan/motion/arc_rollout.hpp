@@ -105,7 +105,9 @@ double PathSweep<M>::cost(const SweptPath& path, Index first, Index count, doubl
     const auto before = here - 1;
     const double dx = path.poses[here].x - path.poses[before].x;
     const double dy = path.poses[here].y - path.poses[before].y;
-    path.lengths[here] = path.lengths[before] + std::sqrt(dx * dx + dy * dy);
+    const Vec2 middle{path.poses[before].x + 0.5 * dx, path.poses[before].y + 0.5 * dy};
+    const double step = std::sqrt(dx * dx + dy * dy) * problem_.price.factor(middle);
+    path.lengths[here] = path.lengths[before] + step;
     const auto objects = path.objects.row(n);
     std::copy_n(path.objects.row(n - 1).begin(), objects.size(), objects.begin());
     std::fill(moved_.begin(), moved_.end(), 0.0);

@@ -1,13 +1,36 @@
 // What searches know of a problem, and of a path.
 #pragma once
 
+#include <cmath>
 #include <span>
 
+#include "pushplan/array.hpp"
 #include "pushplan/motion/collision.hpp"
 #include "pushplan/motion/dubins.hpp"
 #include "pushplan/motion/goal_region.hpp"
 
 namespace pushplan {
+
+/// Prices of places in square cells: a metre where the price is p costs as much as 1 + p elsewhere.
+struct PriceGrid {
+  ArrayView<const double, 2> prices;  // (rows, columns), row 0 at the least y of the grid
+  Pose origin{};                      // of the outer corner of cell (0, 0), world frame
+  double cell = 1.0;                  // side [m]
+
+  /// What a metre costs at a point of the world; 1 outside of the grid.
+  double factor(Vec2 p) const {
+    if (prices.size() == 0) return 1.0;
+    const double dx = p.x - origin.x;
+    const double dy = p.y - origin.y;
+    const double c = std::cos(origin.theta);
+    const double s = std::sin(origin.theta);
+    const auto column = static_cast<Index>(std::floor((c * dx + s * dy) / cell));
+    const auto row = static_cast<Index>(std::floor((c * dy - s * dx) / cell));
+    if (row < 0 || row >= prices.extent(0)) return 1.0;
+    if (column < 0 || column >= prices.extent(1)) return 1.0;
+    return 1.0 + prices(row, column);
+  }
+};
 
 /// Costs and constraints of a path.
 struct PathProblem {
@@ -21,6 +44,7 @@ struct PathProblem {
   GoalRegion goal;
   Footprint footprint;  // with its margin
   ConvexObstacles walls;
+  PriceGrid price{};
 };
 
 /// A path with the K objects that it sweeps, in memory of somebody else that may be longer than the
@@ -29,7 +53,7 @@ struct SweptPath {
   std::span<Pose> poses;         // (M,)
   std::span<double> curvatures;  // (M,) of the arc that leads to each pose [1/m]
   ArrayView<Pose, 2> objects;    // (M, K) where the objects are when the robot is at each pose
-  std::span<double> lengths;     // (M,) path length so far [m]
+  std::span<double> lengths;     // (M,) path length so far, at its price [m]
   std::span<double> works;       // (M,) interaction work so far [kg m]
 
   PathBuffer buffer() const { return {poses, curvatures}; }

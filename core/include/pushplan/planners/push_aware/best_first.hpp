@@ -113,7 +113,8 @@ bool PushLattice<M>::settle(PushTree::Node& node, double length) {
   const auto moved = rollout_.moved();
   double work = 0.0;
   for (std::size_t k = 0; k < moved.size(); ++k) work += moved[k] * branching_.masses[k];
-  const double cost = parent.cost + problem().robot_mass * length + problem().push_weight * work;
+  const double priced = length * problem().price.factor({node.pose.x, node.pose.y});
+  const double cost = parent.cost + problem().robot_mass * priced + problem().push_weight * work;
   const bool goal = in_goal(node.pose);
   if (!goal) {
     const auto objects = work > 0.0 ? rollout_.objects() : tree.objects(parent.row);
@@ -122,7 +123,7 @@ bool PushLattice<M>::settle(PushTree::Node& node, double length) {
     best = cost;
   }
   node.row = work > 0.0 ? tree.add_objects(rollout_.objects()) : parent.row;
-  // only work and a shorter arc change what was guessed
+  // only work, a price and a shorter arc change what was guessed
   node.estimate += std::max(cost - node.cost, 0.0);
   if (goal) node.estimate = std::max(cost, parent.estimate);
   node.cost = cost;

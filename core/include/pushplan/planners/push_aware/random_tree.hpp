@@ -72,8 +72,9 @@ Growth grow(PushTree& tree, std::span<const GrowthDraw> draws, double bound, dou
     const double length = tree.drive(node, rollout);
     if (length == 0.0) continue;
     const double work = work_of(rollout.moved(), model.inverse_masses());
-    const double cost = parent.cost + problem.robot_mass * length + problem.push_weight * work;
     const Vec2 place{node.pose.x, node.pose.y};
+    const double priced = length * problem.price.factor(place);
+    const double cost = parent.cost + problem.robot_mass * priced + problem.push_weight * work;
     if (!(cost + problem.robot_mass * problem.goal.distance(place) < bound)) continue;
     node.arc.length = length;
     node.cost = cost;
