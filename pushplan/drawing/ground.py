@@ -46,8 +46,8 @@ def draw_ground(canvas: Canvas, static: StaticMap, goal: Goal, palette: Palette)
     """Draw it on any canvas."""
     fill, edge = palette.goal
     if isinstance(goal, GoalDisc):
-        canvas.disc(goal.center, goal.radius, fill, edge, 1.5)
-        if isinstance(goal, GoalPose):
+        canvas.disc(goal.center, max(goal.radius, canvas.metres(3.0)), fill, edge, 1.5)
+        if isinstance(goal, GoalPose) and goal.heading_tolerance < math.pi:
             canvas.polygon(goal.arrow(max(goal.radius, canvas.metres(14.0))), edge, edge)
     elif isinstance(goal, GoalLine):
         reach = 2.0 * float(np.hypot(*(static.bounds[2:] - static.bounds[:2])))
@@ -60,14 +60,10 @@ def draw_ground(canvas: Canvas, static: StaticMap, goal: Goal, palette: Palette)
     elif isinstance(goal, ClearanceArea):
         _clearance_area(canvas, goal, palette)
     elif isinstance(goal, ObjectGoals):
-        for pose, radius, turn in zip(
-            goal.poses, goal.radii.tolist(), goal.heading_tolerances.tolist(), strict=True
-        ):
-            canvas.disc(pose[:2], max(radius, canvas.metres(3.0)), fill, edge, 1.5)
-            if turn < math.pi:
-                canvas.polygon(arrow_head(pose, max(radius, canvas.metres(14.0))), edge, edge)
-        if goal.robot is not None:
-            draw_ground(canvas, StaticMap.build(bounds=static.bounds), goal.robot, palette)
+        floor = StaticMap.build(bounds=static.bounds)
+        for place in (*goal.places, goal.robot):
+            if place is not None:
+                draw_ground(canvas, floor, place, palette)
     else:
         canvas.polygon(goal.polygon, fill, edge, 3.0)
     for polygon in static.polygons:

@@ -42,11 +42,10 @@ def shared_ways(
     if not isinstance(goal, ObjectGoals):
         return ways(goal, places)
     found = np.zeros(len(ids))
-    discs = [GoalDisc(*row) for row in zip(goal.poses[:, :2], goal.radii.tolist(), strict=True)]
     for group in np.unique(goal.groups):
         own = np.flatnonzero(goal.groups == group)
         k = np.flatnonzero(np.isin(ids, goal.ids[own]))
-        lengths = np.column_stack([ways(discs[g], places[k]) for g in own.tolist()])
+        lengths = np.column_stack([ways(goal.places[g], places[k]) for g in own.tolist()])
         found[k] = lengths[np.arange(len(k)), least_pairing(lengths)]
     return found
 

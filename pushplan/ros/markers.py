@@ -33,8 +33,8 @@ def scene_markers(messages: Messages, world: World) -> Any:
         if isinstance(goal, GoalPose):
             size = max(goal.radius, 0.5 * world.robot.circumscribed_radius)
             area.append(goal.arrow(size))
-    elif isinstance(goal, ManipulationGoal):
-        area = [goal.polygon]
+    else:
+        area = list(world.goal_polygons)
     base = messages.base_frame
     frame = messages.frame_id
     time = world.time

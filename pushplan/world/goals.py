@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
@@ -267,6 +268,12 @@ class ObjectGoals(ArrayRecord, CheckedFields):
             if len(wrong):
                 most = f" and at most {high:g}" if high < math.inf else ""
                 raise InvalidInputError(f"goal.{name} must be positive{most}, got {wrong[0]:g}")
+
+    @cached_property
+    def places(self) -> tuple[GoalPose, ...]:
+        """Each place as a goal pose."""
+        rows = zip(self.poses, self.radii.tolist(), self.heading_tolerances.tolist(), strict=True)
+        return tuple(GoalPose(pose[:2], radius, pose[2], turn) for pose, radius, turn in rows)
 
     def wanted(self, ids: IntArray) -> BoolArray:
         """(K,) which objects have a place."""
