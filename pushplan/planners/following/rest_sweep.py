@@ -10,23 +10,25 @@ from pushplan.world import Plan, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import path_lengths
 
-_WHOLE = 65_536  # predicted poses of objects that are swept in one command
-_PART = 16_384  # and those of a part of a longer rest: about a millisecond
+_WALLS = 80  # objects that take as long for each pose of the robot as the walls
+_WHOLE = 65_536  # poses times objects, walls included, that are swept in one command
+_PART = 24_576  # and those of a part of a longer rest: about a millisecond
 _LEAST = 32  # poses of a part
 
 
 class RestSweep:
     """Sweeps the rest of a plan from where everything is, and compares that with its prediction.
 
-    A long rest among many objects is swept in parts, so that a command takes bounded time: the
-    next part of the way in each command, and beside it one part farther on, from where the part
-    before has left the objects.
+    A long rest among many objects is swept in parts, so that a command takes bounded time: in turn
+    the next part of the way, and one part farther on, from where the part before has left the
+    objects.
     """
 
     def __init__(self) -> None:
         self._plan: Plan | None = None
         """The plan whose farther parts are being swept."""
         self._at = 0
+        self._farther_next = False
         self._excess = 0.0
         self._objects: FloatArray
 
@@ -52,10 +54,12 @@ class RestSweep:
         Returns:
             -1 for no jam; and the work beyond what was predicted [kg m], -inf until the last part.
         """
-        count = len(world.movables)
+        count = len(world.movables) + _WALLS
         near = end
         if (end - index) * count > _WHOLE:
             near = min(end, index + max(_PART // count, _LEAST))
+        if farther and self._farther_next and self._plan is plan:
+            return self._look_farther(world, plan, index, near - index, end, interaction)
         jammed_at, excess, objects = _part(world, plan, index, near, interaction)
         if near == end or jammed_at >= 0 or not farther:
             self._plan = None
@@ -65,18 +69,30 @@ class RestSweep:
             self._at = near - 1
             self._excess = excess
             self._objects = objects
+        self._farther_next = True
+        return -1, -math.inf
+
+    def _look_farther(
+        self,
+        world: World,
+        plan: Plan,
+        index: int,
+        count: int,
+        end: int,
+        interaction: InteractionModel,
+    ) -> tuple[int, float]:
+        """Take the next of the farther parts, of ``count`` poses."""
+        self._farther_next = False
         first = self._at
         start = world.moved(robot_pose=plan.poses[first], movable_poses=self._objects)
-        last = min(end, first + near - index)
-        jammed_at, excess, self._objects = _part(start, plan, first, last, interaction)
-        self._at = last - 1
+        self._at = min(end, first + count) - 1
+        jammed_at, excess, self._objects = _part(start, plan, first, self._at + 1, interaction)
         self._excess += excess
-        if jammed_at >= 0:
-            self._plan = None
-            return first - index + jammed_at, -math.inf
-        if last < end:
+        if jammed_at < 0 and self._at + 1 < end:
             return -1, -math.inf
         self._plan = None
+        if jammed_at >= 0:
+            return first - index + jammed_at, -math.inf
         return -1, self._excess
 
 

@@ -205,6 +205,7 @@ class TestALongRest:
         """Looks along a plan until the answer is complete; for parts of so many poses."""
         monkeypatch.setattr(rest_sweep, "_WHOLE", request.param)
         monkeypatch.setattr(rest_sweep, "_PART", request.param)
+        monkeypatch.setattr(rest_sweep, "_WALLS", 0)
         monkeypatch.setattr(rest_sweep, "_LEAST", 5)
 
         def until_known(world, plan):
@@ -234,19 +235,20 @@ class TestALongRest:
         assert swept.jammed_at > 10
         assert look(world, plan)[0] == swept.jammed_at
 
-    def test_a_command_sweeps_two_parts_at_most(self, look):
+    def test_a_command_sweeps_one_part(self, look):
         world = floor([[30.0, 0.0, 0.0]])
         *_, calls = look(world, line_plan(world))
-        assert calls == {10: 8, 37: 2, 1000: 1}[rest_sweep._PART]
+        assert calls == {10: 16, 37: 4, 1000: 1}[rest_sweep._PART]
 
     def test_what_is_farther_on_waits_until_a_plan_may_be_asked_for(self, monkeypatch):
+        monkeypatch.setattr(rest_sweep, "_WALLS", 0)
         monkeypatch.setattr(rest_sweep, "_WHOLE", 40)
         monkeypatch.setattr(rest_sweep, "_PART", 40)
         rest = RestSweep()
         world = floor([[30.0, 0.0, 0.0]])
         plan = line_plan(world)
-        answers = [rest.look(world, plan, 0, 81, MODEL, k > 2)[1] for k in range(5)]
-        assert answers == [-math.inf, -math.inf, -math.inf, -math.inf, 0.0]
+        answers = [rest.look(world, plan, 0, 81, MODEL, k > 1)[1] for k in range(6)]
+        assert answers == [-math.inf] * 5 + [0.0]
 
 
 class TestStitching:
