@@ -12,7 +12,7 @@ from pushplan.world.polyline import path_lengths
 
 _WALLS = 80  # objects that take as long for each pose of the robot as the walls
 _WHOLE = 65_536  # poses times objects, walls included, that are swept in one command
-_PART = 24_576  # and those of a part of a longer rest: about a millisecond
+_PART = 16_384  # and those of a part of a longer rest: about a millisecond
 _LEAST = 32  # poses of a part
 
 
