@@ -26,7 +26,7 @@ class PreparedPlanner(Protocol):
 
 @dataclass(frozen=True)
 class Answer:
-    """What comes of a planning call.
+    """Outcome of a planning call, ready to be driven.
 
     Args:
         result: of the planner.
@@ -72,8 +72,9 @@ class PlanningCall:
             return Answer(result)
         _check(result.plan, self.start)
         plan = joined(self.stretch, result.plan)
-        kept = None if self.comparison is None else self.comparison.rest_unless_cheaper(plan)
-        return Answer(result, plan, kept)
+        if self.comparison is None:
+            return Answer(result, plan)
+        return Answer(result, plan, self.comparison.rest_unless_cheaper(plan))
 
 
 @dataclass(frozen=True)

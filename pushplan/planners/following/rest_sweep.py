@@ -1,4 +1,4 @@
-"""`RestSweep`: what the rest of a plan would do now, a part of it in each command."""
+"""`RestSweep`: predicts the rest of a plan anew, a part of it in each command."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ class RestSweep:
 def _part(
     world: World, plan: Plan, index: int, end: int, interaction: InteractionModel
 ) -> tuple[int, float, FloatArray]:
-    """Where a part of a plan jams, its work beyond the prediction, and the objects after it."""
+    """Pose at which a part of a plan jams, its excess of work, and the objects after it."""
     assert plan.object_poses is not None
     now, _ = sweep_rest(world, plan, index, interaction, end)
     masses = world.movables.masses
