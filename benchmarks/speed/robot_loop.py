@@ -1,48 +1,62 @@
-"""A `Runner` at the wheel of a MuJoCo robot in another process, in real time.
+"""A `Runner` at the wheel of a robot in another process, in real time, beside a busy process.
 
-    python -m benchmarks.speed.robot_loop [--seconds S] [--rate HZ] [--kill] [--policies NAME ...]
+    python -m benchmarks.speed.robot_loop [--seconds S] [--rates HZ ...] [--busy N] [--kill]
+                                          [--policies NAME ...] [--suites NAME ...]
 
-The other process is `examples/robot_process.py`. An episode that has ended is followed by another
-one. Here, one thread receives worlds and another one asks for commands, as on a robot.
+The robot is `examples/robot_process.py`, a simulator at the pace of the wall clock. An episode that
+has ended is followed by another one. Here, one thread receives worlds, another one asks for
+commands, and a third one plans, as on a robot. ``--busy`` further processes compute all the time.
 
-Per policy it writes how long `Runner.command` took (median, 99.9th percentile and worst), how much
-of that the thread computed itself at worst (the rest is the machine doing other work), how many
-commands were late, by how much memory grew from a tenth of the time to half of it and from there to
-the end, and how the episodes ended. With --kill a planning
-thread is ended now and then in the middle of its call, by an exception that no planner catches.
-With --realtime the loop and the simulator have real-time priorities, as on a robot, so that other
-work on the machine delays them less; planning has none. That needs the right to set priorities.
+Per policy, suite and rate it writes the CPU time of `Runner.command` (median, 99.9th percentile and
+worst): what other processes do counts for nothing, but neither does waiting for the interpreter
+lock. That, and the scheduler of the machine, is in the lateness: by how much a command was there
+later than it was due. *Late* are the commands that the runner calls so. Memory is the growth from a
+tenth of the time to half of it, and from there to the end. With --kill a planning thread is ended
+now and then in the middle of its call, by an exception that no planner catches.
 """
 
 from __future__ import annotations
 
 import argparse
-import os
 import socket
 import sys
 import threading
 import time
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from benchmarks.reporting import command_line, resident_mb
+from benchmarks.reporting import command_line, head, origin, percentiles, resident_mb, row, write
+from pushplan.learned import load_policy
 from pushplan.runtime import Runner
 from pushplan.runtime.runner import PLAN_STOP
 from pushplan.scenarios import suite
-from pushplan.world import Stop, StopCheck, World
+from pushplan.world import Stop, StopCheck, Twist, World
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "examples"))
 from robot_process import ADDRESS, LARGEST, command_bytes, seen, start_robot
 
+_NAVIGATION = ("maze-3d-3", "office-1k", "office-5k")
 SUITES = {
-    "push-aware": "maze-3d-3",
-    "kinodynamic-rrt": "maze-3d-3",
-    "gtsp-mpc": "area-clearing-3d-10",
-    "ship-predictive": "ship-ice-3d-20",
+    "straight": _NAVIGATION,
+    "kinodynamic-rrt": _NAVIGATION,
+    "push-aware": _NAVIGATION,
+    "namo": _NAVIGATION,
+    "gtsp-mpc": ("area-clearing-3d-10",),
+    "ship-predictive": ("ship-ice-3d-20",),
+    "maze-ppo": ("maze-2d-10",),
 }
+COLUMNS = (
+    *("policy", "suite", "Hz", "commands", "CPU p50 [ms]", "p99.9", "worst"),
+    *("late by p50 [ms]", "p99.9", "worst", "late", "memory [MB]"),
+    *("killed", "failures", "episodes"),
+)
 _KILL_EVERY_S = 20.0
 _MEMORY_AT = (0.1, 0.5, 0.98, np.inf)  # of the time
 
@@ -50,52 +64,85 @@ _MEMORY_AT = (0.1, 0.5, 0.98, np.inf)  # of the time
 def main() -> None:
     """Measure, write the table."""
     parser = command_line(__doc__, seed=1000)
-    parser.add_argument("--seconds", type=float, default=1000.0)
-    parser.add_argument("--rate", type=float, default=20.0)
+    parser.add_argument("--seconds", type=float, default=100.0, help="of each row; default 100")
+    parser.add_argument("--rates", nargs="+", type=float, default=[20.0, 100.0])
+    parser.add_argument("--busy", type=int, default=1, help="processes that compute; default 1")
     parser.add_argument("--kill", action="store_true")
-    parser.add_argument("--realtime", action="store_true", help="Linux real-time priorities")
     parser.add_argument("--policies", nargs="+", default=list(SUITES), choices=list(SUITES))
+    parser.add_argument("--suites", nargs="+", help="only these of each policy's")
     options = parser.parse_args()
-    print(
-        "| policy | suite | commands | median | p99.9 | worst | own worst | late | "
-        "memory | killed | failures | episodes |"
-    )
-    print("|---" * 12 + "|")
-    for policy in options.policies:
-        print(row(policy, options), flush=True)
+    write(origin(), "")
+    head(*COLUMNS)
+    with busy(options.busy):
+        for policy in options.policies:
+            for name in SUITES[policy]:
+                for rate in options.rates if name in (options.suites or [name]) else ():
+                    row(*cells(policy, name, rate, options))
 
 
-def row(policy: str, options: argparse.Namespace) -> str:
-    """Drive with one policy; its line of the table."""
-    scenarios = suite(SUITES[policy], episodes=500, first_seed=options.seed).scenarios
-    period = 1.0 / options.rate
-    robot, ours = start_robot(policy, scenarios, period)
+@contextmanager
+def busy(count: int) -> Iterator[None]:
+    """So many processes that compute meanwhile."""
+    context = get_context("spawn")
+    processes = [context.Process(target=_compute, daemon=True) for _ in range(count)]
+    for process in processes:
+        process.start()
+    try:
+        yield
+    finally:
+        for process in processes:
+            process.terminate()
+
+
+def _compute() -> None:
+    while True:
+        np.linalg.svd(np.ones((50, 50)))
+
+
+class Network:
+    """A shipped network that gives turn rates, asked with what it observes of the world."""
+
+    actions = ("turn_rate",)
+
+    def __init__(self, name: str) -> None:
+        self._policy = load_policy(name)
+
+    def reset(self, world: World, rng: np.random.Generator) -> None:
+        """Begin an episode."""
+        self._policy.reset(world, rng)
+
+    def act(self, world: World, observation: Any = None) -> Twist:
+        """Return the velocity that the network wants."""
+        (turn,) = self._policy.act(world, None)
+        return Twist(world.robot.max_speed, float(np.clip(turn, -1, 1)) * world.robot.max_turn_rate)
+
+
+def cells(policy: str, name: str, rate: float, options: argparse.Namespace) -> list[str]:
+    """Drive with one policy in one suite; its cells of the table."""
+    scenarios = suite(name, episodes=500, first_seed=options.seed).scenarios
+    period = 1.0 / rate
+    network = policy.startswith("maze-")
+    # a robot for the network takes turn rates, as it does from this planner
+    robot, ours = start_robot("kinodynamic-rrt" if network else policy, scenarios, period)
     killer = Killer()
-    runner = Runner(policy, period=period, plan_stop=PLAN_STOP | killer)
+    driver = Network(policy) if network else policy
+    runner = Runner(driver, period=period, plan_stop=PLAN_STOP | killer)
     loop = _Loop(runner, ours, period, killer, options.kill)
-    if options.realtime:
-        set_priority(0, 30)
-        set_priority(robot.pid, 20)
     try:
         loop.run(options.seconds)
     finally:
         robot.terminate()
         robot.join()
-    took = 1e3 * np.array(loop.took)
-    own = 1e3 * np.array(loop.own)
-    cells = [
-        policy,
-        SUITES[policy],
-        str(len(took)),
-        *(f"{value:.2f} ms" for value in (np.median(took), np.quantile(took, 0.999), took.max())),
-        f"{own.max():.2f} ms",
-        str(loop.late),
-        ", ".join(f"{mb:+.1f}" for mb in np.diff(loop.memory)) + " MB",
+    numbers = []
+    for values in (loop.own, loop.behind):
+        numbers += percentiles(1e3 * np.array(values), (50, 99.9, 100), 2)
+    return [
+        *(policy, name, f"{rate:g}", str(len(loop.own)), *numbers, str(loop.late)),
+        ", ".join(f"{mb:+.1f}" for mb in np.diff(loop.memory)),
         str(killer.killed),
         str(loop.failures),
         ", ".join(f"{count} {reason}" for reason, count in loop.reasons.items()) or "none ended",
     ]
-    return "| " + " | ".join(cells) + " |"
 
 
 class _Loop:
@@ -109,8 +156,8 @@ class _Loop:
         self._period = period
         self.killer = killer
         self._kill = kill
-        self.took: list[float] = []
         self.own: list[float] = []
+        self.behind: list[float] = []
         self.reasons: Counter[str] = Counter()
         self.late = self.failures = 0
         self.memory: list[float] = []
@@ -166,7 +213,7 @@ class _Loop:
             self._now = max(self._now, before - self._offset)
             command = self.runner.command(self._now)
             self.own.append(time.thread_time() - own)
-            self.took.append(time.perf_counter() - before)
+            self.behind.append(time.perf_counter() - due)
             self.late += command.late
             self._socket.sendto(command_bytes(self._number, command.twist), there)
             if self._kill and before > next_kill:
@@ -176,12 +223,6 @@ class _Loop:
                 self.memory.append(resident_mb())
             due += self._period
             time.sleep(max(0.0, due - time.perf_counter()))
-
-
-def set_priority(process: int | None, priority: int) -> None:
-    """Real-time priority of a process, or of this thread (0), but not of what it starts."""
-    policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
-    os.sched_setscheduler(process or 0, policy, os.sched_param(priority))
 
 
 class Killer(Stop):

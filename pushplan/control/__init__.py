@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from pushplan.control.episode_clock import EpisodeClock
-from pushplan.control.executors import ImmediateExecutor, SimulatedExecutor
+from pushplan.control.executors import DelayedExecutor, ImmediateExecutor, SimulatedExecutor
 from pushplan.control.leg_follower import LegFollower, Legs
 from pushplan.control.limits import TwistLimiter, clamp_twist
 from pushplan.control.path_follower import PathFollower
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from pushplan.control.mpc import MpcConfig, MpcTracker
 
 __all__ = [
+    "DelayedExecutor",
     "EpisodeClock",
     "ImmediateExecutor",
     "LegFollower",

@@ -75,6 +75,34 @@ class ImmediateExecutor:
         return _Done(call(stop), -math.inf)
 
 
+class DelayedExecutor(ImmediateExecutor):
+    """Runs calls at once; their results are there a fixed time later, by the clock of the worlds.
+
+    So a loop repeats to the byte, if seeds are the same and rules count iterations: a plan that is
+    asked for at step k of a loop of period T arrives at step k + n with a delay of n T.
+
+    Args:
+        delay: what every call takes [s].
+        rule: ends each call, beside its own rule.
+    """
+
+    takes_time = True
+
+    def __init__(self, delay: float, rule: Stop | None = None) -> None:
+        super().__init__(rule)
+        self._delay = number("delay", delay, low=0.0)
+
+    def expected(self, stop: Stop | None) -> float:
+        """The delay [s]."""
+        return self._delay
+
+    def submit(
+        self, call: Callable[[Stop | None], T], time: float, stop: Stop | None = None
+    ) -> _Done[T]:
+        """See `pushplan.world.PlanningExecutor`."""
+        return _Done(super().submit(call, time, stop).result(), time + self._delay)
+
+
 class SimulatedExecutor:
     """Runs calls at once; their results are there after the time that they would have taken.
 

@@ -1,5 +1,6 @@
 """From worlds to motor commands, in a robot's own loop."""
 
+from pushplan.control import DelayedExecutor
 from pushplan.runtime.command import Command, CommandStatus, RunLog
 from pushplan.runtime.disturbances import Disturbances
 from pushplan.runtime.disturbed_policy import DisturbedPolicy
@@ -12,6 +13,7 @@ __all__ = [
     "PLAN_STOP",
     "Command",
     "CommandStatus",
+    "DelayedExecutor",
     "Disturbances",
     "DisturbedPolicy",
     "Motors",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections import deque
 from dataclasses import replace
@@ -10,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.control import SimulatedExecutor, clamp_twist
+from pushplan.control import DelayedExecutor, clamp_twist
 from pushplan.control.limits import driven_twist
 from pushplan.runtime.disturbances import Disturbances
 from pushplan.runtime.runner import Runner
@@ -61,8 +60,7 @@ class DisturbedPolicy:
         self.runner: Runner | None = None
 
     def _make(self) -> Runner:
-        ticks = itertools.count(0.0, self._planning_time)
-        executor = SimulatedExecutor(1.0, ticks.__next__)
+        executor = DelayedExecutor(self._planning_time)
         return Runner(self._policy, period=self._period, executor=executor, **self._options)
 
     def reset(self, world: World, rng: np.random.Generator) -> None:

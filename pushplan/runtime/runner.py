@@ -83,7 +83,7 @@ class Runner:
         contact: friction and pressure, as `pushplan.interaction.identify` finds them, by which the
             policy predicts pushes; for a policy that is given by its name.
         log: keeps worlds, plans and commands.
-        executor: runs planning calls; a thread by default, another one for simulation.
+        executor: runs planning calls; a thread by default, `DelayedExecutor` for tests.
         clock: returns seconds, by which planning calls are timed.
 
     Attributes:

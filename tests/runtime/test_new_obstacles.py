@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections import deque
 from collections.abc import Callable
@@ -14,7 +13,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pushplan.control import SimulatedExecutor
+from pushplan.control import DelayedExecutor
 from pushplan.geometry.transforms import arc_step
 from pushplan.interaction import QuasiStatic
 from pushplan.runtime import Command, CommandStatus, Runner
@@ -105,11 +104,10 @@ class DrivenRobot:
     def __init__(
         self, policy: object, world: World, *, delay: float = 0.0, noise: float = 0.0, seed: int = 0
     ) -> None:
-        ticks = itertools.count(0.0, 0.1)
         self.runner = Runner(
             policy,
             period=PERIOD,
-            executor=SimulatedExecutor(1.0, ticks.__next__),
+            executor=DelayedExecutor(0.1),
             delay=delay,
             position_noise=noise,
             heading_noise=noise,

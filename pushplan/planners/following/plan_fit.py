@@ -9,16 +9,9 @@ import numpy as np
 from pushplan.control.limits import driven_twist
 from pushplan.control.tracking import Progress
 from pushplan.interaction import InteractionModel
-from pushplan.planners.following.replanning import (
-    Reason,
-    Replanning,
-    cost_of_rest,
-    free_length,
-    rest_of,
-    sweep_rest,
-)
+from pushplan.planners.following.replanning import Comparison, Reason, Replanning, free_length
+from pushplan.planners.following.rest_sweep import RestSweep
 from pushplan.world import Plan, RobotModel, StaticMap, World
-from pushplan.world.polyline import path_lengths
 
 _NEAR = 3  # so many poses ahead a jam lets nothing wait
 _TIGHT_PAUSES = 4.0  # after which a tight plan is made anew
@@ -38,6 +31,7 @@ class PlanFit:
         self._clear_of: StaticMap | None = None
         """Static map that the present plan is known to be clear of."""
         self._tight = False
+        self._rest = RestSweep()
 
     def take_up(self, static: StaticMap, *, tight: bool) -> None:
         """Begin with another plan.
@@ -72,35 +66,14 @@ class PlanFit:
             self._clear_of = world.static
         return free
 
-    def rest_unless_cheaper(
-        self, world: World, old: Plan, new: Plan, interaction: InteractionModel, weight: float
-    ) -> Plan | None:
-        """The rest of the present plan as it is predicted now; None if a new plan replaces it.
-
-        Args:
-            world: the scene now.
-            old: the present plan.
-            new: another one.
-            interaction: predicts the objects.
-            weight: of interaction, w.
-        """
-        margin = self._rule.margin
-        if margin is None or self.free_length(world, old) < math.inf:
+    def comparison(
+        self, world: World, plan: Plan, interaction: InteractionModel, weight: float
+    ) -> Comparison | None:
+        """Compares new plans with the rest of the present one; None where any is taken up."""
+        if self._rule.margin is None:
             return None
-        robot = world.robot
-        index = self._progress.index(self._progress.along)
-        swept, path = sweep_rest(world, old, index, interaction)
-        old_cost = cost_of_rest(world, path, swept, weight)
-        swept_new, path = sweep_rest(world, new, 0, interaction)
-        new_cost = cost_of_rest(world, path, swept_new, weight)
-        if new_cost < old_cost - margin * robot.circumscribed_radius * robot.mass:
-            return None
-        if np.isinf(old_cost):
-            return None
-        # what is expected of it from now on
-        rest = rest_of(old, index, swept.object_poses)
-        self._progress.update(rest, world.robot_pose)
-        return rest
+        index = self._progress.index(self._progress.update(plan, world.robot_pose))
+        return Comparison(world, plan, index, interaction, weight, self._rule.margin)
 
     def reason(
         self,
@@ -138,16 +111,16 @@ class PlanFit:
         driven = np.hypot(*(world.robot_pose[:2] - planned.robot_pose[:2]))
         if waited >= rule.every_seconds - 1e-9 or driven >= rule.renewal * size:
             return Reason.PERIOD
-        end = None
+        end = len(plan.poses)
         if np.isfinite(rule.look_ahead):
-            end = self._progress.index(along + rule.look_ahead * size) + 2
-        return self._surprise(world, plan, slice(index, end), interaction, rested, at_once)
+            end = min(end, self._progress.index(along + rule.look_ahead * size) + 2)
+        return self._surprise(world, plan, (index, end), interaction, rested, at_once)
 
     def _surprise(
         self,
         world: World,
         plan: Plan,
-        part: slice,
+        part: tuple[int, int],
         interaction: InteractionModel,
         rested: bool,
         at_once: bool,
@@ -159,16 +132,13 @@ class PlanFit:
         predicted = plan.object_poses
         if predicted is None or predicted.shape[1] != len(world.movables) or not predicted.size:
             return None
-        now, _ = sweep_rest(world, plan, part.start, interaction, part.stop)
-        if now.jammed_at > _NEAR:
+        jammed_at, excess = self._rest.look(world, plan, *part, interaction, rested)
+        if jammed_at > _NEAR:
             return Reason.JAM if rested else None
-        if now.jammed_at >= 0:
+        if jammed_at >= 0:
             return Reason.BLOCKED if rested or at_once else None
-        expected = float(path_lengths(predicted[part]) @ world.movables.masses)
         allowed = surprise * world.robot.circumscribed_radius * world.robot.mass
-        if rested and now.work - expected > allowed:
-            return Reason.SURPRISE
-        return None
+        return Reason.SURPRISE if rested and excess > allowed else None
 
 
 def reaction_length(world: World, latency: float) -> float:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,8 +16,8 @@ from pushplan.planners.following.plan_controller import PlanController
 from pushplan.planners.following.plan_fit import PlanFit, reaction_length
 from pushplan.planners.following.planning_call import (
     PendingPlan,
+    PlanningCall,
     PreparedPlanner,
-    timed_call,
     without_predictions,
 )
 from pushplan.planners.following.recovery_timing import FruitlessCalls, RecoveryRule
@@ -216,10 +215,15 @@ class PlanFollower:
             world = world.moved(robot_pose=path[-1], robot_twist=np.zeros(3))  # after braking
         start, stretch = world_ahead(world, plan, now, latency, self.interaction)
         self._planned = world
-        call = self._executor.submit(
-            partial(timed_call, self.planner, start, self._rng), world.time, self.stop
-        )
-        self._pending = PendingPlan(call, start, stretch, reason, world.time)
+        comparison = None
+        # from a tight curve into a pose a new plan may have to come round again
+        curves = reason is Reason.TIGHT and isinstance(world.goal, GoalPose)
+        if plan is not None and (curves or not reason.urgent):
+            weight = self.replanning.weight(self.planner)
+            comparison = self._fit.comparison(world, plan, self.interaction, weight)
+        planning = PlanningCall(self.planner, start, stretch, self._rng, comparison)
+        call = self._executor.submit(planning, world.time, self.stop)
+        self._pending = PendingPlan(call, start, reason, world.time)
 
     def _receive(self, world: World) -> None:
         """Take up a plan that is there."""
@@ -227,27 +231,23 @@ class PlanFollower:
         if pending is None or not pending.call.ready(world.time):
             return
         self._pending = None
-        result = pending.call.result()
+        answer = pending.call.result()
+        result = answer.result
         if self.plan_log:
             self.plan_log[-1] = without_predictions(self.plan_log[-1])
         self.plan_log.append(result)
-        if result.plan is None:
+        if answer.plan is None:
             self._fruitless.add(world)
             if pending.reason is Reason.BLOCKED and world.robot.can_stop:
                 self.current_plan = None
             return
         self._fruitless.clear()
-        new = pending.from_now_on(result.plan, world)
         old = self.current_plan
-        # from a tight curve into a pose a new plan may have to come round again
-        curves = pending.reason is Reason.TIGHT and isinstance(world.goal, GoalPose)
-        if old is not None and (curves or not pending.reason.urgent):
-            weight = self.replanning.weight(self.planner)
-            rest = self._fit.rest_unless_cheaper(world, old, new, self.interaction, weight)
-            if rest is not None:
-                self.current_plan = rest
-                return
-        self.current_plan = new
+        kept = answer.kept
+        if kept is not None and old is not None and self._fit.free_length(world, old) == math.inf:
+            self.current_plan = pending.from_now_on(kept, world)
+            return
+        self.current_plan = pending.from_now_on(answer.plan, world)
         tight = result.stats.detail.get("tight", 0.0) > 0.0
         self._fit.take_up(pending.start.static, tight=tight)
 

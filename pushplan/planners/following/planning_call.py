@@ -9,17 +9,9 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from pushplan.planners.following.replanning import Reason, rest_of
+from pushplan.planners.following.replanning import Comparison, Reason, rest_of
 from pushplan.planners.following.splicing import joined, passed
-from pushplan.world import (
-    InvalidInputError,
-    PendingResult,
-    Plan,
-    Planner,
-    PlanResult,
-    Stop,
-    World,
-)
+from pushplan.world import InvalidInputError, PendingResult, Plan, Planner, PlanResult, Stop, World
 from pushplan.world.checks import expect
 
 
@@ -33,50 +25,80 @@ class PreparedPlanner(Protocol):
 
 
 @dataclass(frozen=True)
-class PendingPlan:
-    """A planning call whose plan may not be there yet.
+class Answer:
+    """Outcome of a planning call, ready to be driven.
 
     Args:
-        call: gives the result when it is there.
-        start: the snapshot that it plans from.
-        stretch: what is driven until the plan begins; None for nothing.
-        reason: why the plan is wanted.
-        made: when it was asked for, by the clock of the world [s].
+        result: of the planner.
+        plan: its plan, joined to what is driven until that begins; None if it has none.
+        kept: the rest of the plan that was driven, where the new one is not cheaper.
     """
 
-    call: PendingResult[PlanResult]
+    result: PlanResult
+    plan: Plan | None = None
+    kept: Plan | None = None
+
+
+@dataclass(frozen=True)
+class PlanningCall:
+    """Plans, and does all that makes a plan ready to be driven: that keeps commands short.
+
+    Args:
+        planner: makes the plan.
+        start: the snapshot that it plans from.
+        stretch: what is driven until the plan begins; None for nothing.
+        rng: the planner's randomness.
+        comparison: of the new plan with the present one; None to take up any.
+    """
+
+    planner: Planner
     start: World
     stretch: Plan | None
-    reason: Reason
-    made: float
+    rng: np.random.Generator
+    comparison: Comparison | None
 
-    def from_now_on(self, plan: Plan, world: World) -> Plan:
-        """The plan of this call, without the part that the robot has driven meanwhile.
-
-        Args:
-            plan: what the planner returned.
-            world: the scene now.
+    def __call__(self, stop: Stop | None) -> Answer:
+        """Return the answer; the result has the time that the planner took by our clock.
 
         Raises:
             InvalidInputError: if the plan begins elsewhere, or predicts other objects.
         """
-        _check(plan, self.start)
-        whole = joined(self.stretch, plan)
+        began = time.perf_counter()
+        result = self.planner.plan(self.start, stop=stop, rng=self.rng)
+        took = time.perf_counter() - began
+        result = expect("what the planner returns", result, PlanResult)
+        result = replace(result, stats=replace(result.stats, wall_time_s=took))
+        if result.plan is None:
+            return Answer(result)
+        _check(result.plan, self.start)
+        plan = joined(self.stretch, result.plan)
+        if self.comparison is None:
+            return Answer(result, plan)
+        return Answer(result, plan, self.comparison.rest_unless_cheaper(plan))
+
+
+@dataclass(frozen=True)
+class PendingPlan:
+    """A planning call whose plan may not be there yet.
+
+    Args:
+        call: gives the answer when it is there.
+        start: the snapshot that it plans from.
+        reason: why the plan is wanted.
+        made: when it was asked for, by the clock of the world [s].
+    """
+
+    call: PendingResult[Answer]
+    start: World
+    reason: Reason
+    made: float
+
+    def from_now_on(self, plan: Plan, world: World) -> Plan:
+        """A plan of the answer, without the part that the robot has driven meanwhile."""
         seconds = world.time - self.made
         if seconds <= 0.0:
-            return whole
-        return rest_of(whole, passed(world, whole, seconds), None)
-
-
-def timed_call(
-    planner: Planner, start: World, rng: np.random.Generator, stop: Stop | None
-) -> PlanResult:
-    """The result of a planner, with the time that it took by our clock."""
-    began = time.perf_counter()
-    result = planner.plan(start, stop=stop, rng=rng)
-    took = time.perf_counter() - began
-    result = expect("what the planner returns", result, PlanResult)
-    return replace(result, stats=replace(result.stats, wall_time_s=took))
+            return plan
+        return rest_of(plan, passed(world, plan, seconds), None)
 
 
 def without_predictions(result: PlanResult) -> PlanResult:

@@ -101,15 +101,17 @@ def rest_of(plan: Plan, index: int, predicted: FloatArray | None) -> Plan:
         predicted = objects[index:]
     length = plan.length
     mass = plan.travel_cost / length if length > 0.0 else 0.0
-    return Plan(
+    rest = Plan(
         times=plan.times[index:] - plan.times[index],
         poses=plan.poses[index:],
         speeds=plan.speeds[index:],
         turn_rates=plan.turn_rates[index:],
         travel_cost=mass * path_length(plan.poses[index:]),
         interaction_cost=plan.interaction_cost if index == 0 else 0.0,
-        object_poses=predicted,
     )
+    # checked already, and not copied: it may be millions of numbers
+    object.__setattr__(rest, "object_poses", predicted)
+    return rest
 
 
 def sweep_rest(
@@ -168,3 +170,38 @@ def cost_of_rest(world: World, path: FloatArray, swept: Interaction, weight: flo
     if isinstance(world.goal, GoalDisc | GoalLine):
         length += world.goal.distance(float(path[-1, 0]), float(path[-1, 1]))
     return world.robot.mass * length + weight * swept.work
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Compares a new plan with the rest of the present one, both from one world.
+
+    Args:
+        world: the scene when the new plan was asked for.
+        plan: the present plan.
+        index: of its last pose that the robot has passed.
+        interaction: predicts the objects.
+        weight: of interaction, w.
+        margin: how much cheaper the new plan has to be [R].
+    """
+
+    world: World
+    plan: Plan
+    index: int
+    interaction: InteractionModel
+    weight: float
+    margin: float
+
+    def rest_unless_cheaper(self, new: Plan) -> Plan | None:
+        """The rest of the present plan as it is predicted now; None if a new plan replaces it."""
+        robot = self.world.robot
+        swept, path = sweep_rest(self.world, self.plan, self.index, self.interaction)
+        old_cost = cost_of_rest(self.world, path, swept, self.weight)
+        swept_new, path = sweep_rest(self.world, new, 0, self.interaction)
+        new_cost = cost_of_rest(self.world, path, swept_new, self.weight)
+        if new_cost < old_cost - self.margin * robot.circumscribed_radius * robot.mass:
+            return None
+        if np.isinf(old_cost):
+            return None
+        # what is expected of it from now on
+        return rest_of(self.plan, self.index, swept.object_poses)

@@ -10,6 +10,7 @@ from conftest import make_boxes, make_robot, make_u_maze
 
 from pushplan.control import Progress, SimulatedExecutor
 from pushplan.interaction import QuasiStatic
+from pushplan.planners.following import rest_sweep
 from pushplan.planners.following.plan_follower import PlanFollower
 from pushplan.planners.following.replanning import (
     Reason,
@@ -18,6 +19,7 @@ from pushplan.planners.following.replanning import (
     rest_of,
     sweep_rest,
 )
+from pushplan.planners.following.rest_sweep import RestSweep
 from pushplan.planners.following.splicing import joined, passed, world_ahead
 from pushplan.world import (
     Drive,
@@ -193,6 +195,60 @@ def test_no_sweep_where_nothing_can_be_a_reason():
     policy = PlanFollower(Scripted(line_plan), replanning=rule, interaction=Broken())
     policy.act(floor(BOX))
     policy.act(floor(BOX, robot_pose=[0.1, 0, 0], time=1.0))
+
+
+class TestALongRest:
+    """It is swept in parts, which find what one sweep finds."""
+
+    @pytest.fixture(params=[10, 37, 1000])
+    def look(self, request, monkeypatch):
+        """Looks along a plan until the answer is complete; for parts of so many poses."""
+        monkeypatch.setattr(rest_sweep, "_WHOLE", request.param)
+        monkeypatch.setattr(rest_sweep, "_PART", request.param)
+        monkeypatch.setattr(rest_sweep, "_WALLS", 0)
+        monkeypatch.setattr(rest_sweep, "_LEAST", 5)
+
+        def until_known(world, plan):
+            rest = RestSweep()
+            for calls in range(1, 30):
+                jammed_at, excess = rest.look(world, plan, 0, len(plan.poses), MODEL, True)
+                if jammed_at >= 0 or excess > -math.inf:
+                    return jammed_at, excess, calls
+            return pytest.fail("no end")
+
+        return until_known
+
+    def test_what_a_box_in_the_way_costs(self, look):
+        plan = line_plan(floor([[30.0, 0.0, 0.0]]))  # expected out of the way
+        world = floor([[5.0, 0.0, 0.0]])
+        swept, path = sweep_rest(world, plan, 0, MODEL)
+        jammed_at, excess, _ = look(world, plan)
+        assert (jammed_at, len(path)) == (-1, 81)
+        assert swept.work > 1.0
+        assert excess == pytest.approx(swept.work)
+
+    def test_where_it_would_jam(self, look):
+        plan = line_plan(floor([[30.0, 0.0, 0.0]]))
+        walls = StaticMap.build(polygons=[[[7, -5], [8, -5], [8, 5], [7, 5]]])
+        world = floor([[5.0, 0.0, 0.0]], static=walls)
+        swept, _ = sweep_rest(world, plan, 0, MODEL)
+        assert swept.jammed_at > 10
+        assert look(world, plan)[0] == swept.jammed_at
+
+    def test_a_command_sweeps_one_part(self, look):
+        world = floor([[30.0, 0.0, 0.0]])
+        *_, calls = look(world, line_plan(world))
+        assert calls == {10: 16, 37: 4, 1000: 1}[rest_sweep._PART]
+
+    def test_what_is_farther_on_waits_until_a_plan_may_be_asked_for(self, monkeypatch):
+        monkeypatch.setattr(rest_sweep, "_WALLS", 0)
+        monkeypatch.setattr(rest_sweep, "_WHOLE", 40)
+        monkeypatch.setattr(rest_sweep, "_PART", 40)
+        rest = RestSweep()
+        world = floor([[30.0, 0.0, 0.0]])
+        plan = line_plan(world)
+        answers = [rest.look(world, plan, 0, 81, MODEL, k > 1)[1] for k in range(6)]
+        assert answers == [-math.inf] * 5 + [0.0]
 
 
 class TestStitching:
