@@ -59,8 +59,6 @@ def main() -> None:
         if not robot.can_stop:
             continue
         for planner in PLANNERS:
-            if planner == "straight" and robot.min_turning_radius:
-                continue  # pure pursuit of a polyline
             cases = islice(barn_cases(options.barn, robot, options.seed), options.worlds)
             ends = [driven(case.world, planner) for case in cases]
             goals = [world.goal for world, _ in ends if isinstance(world.goal, GoalPose)]

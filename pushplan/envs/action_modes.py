@@ -10,6 +10,7 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
+from pushplan.control import clamp_twist
 from pushplan.envs.tasks.base import Task
 from pushplan.world import Action, InvalidInputError, Twist, UnknownNameError, WheelSpeeds, World
 from pushplan.world.checks import FloatArray, is_finite
@@ -134,14 +135,15 @@ class TurnRateAction(ActionMode):
 
 
 class VelocityAction(ActionMode):
-    """Forward speed and turn rate of a differential drive, times the robot's limits."""
+    """Forward speed and turn rate, times the robot's limits; a car turns as its speed allows."""
 
     size = 2
 
     def start(self, action: FloatArray, world: World) -> Motion:
         """One command within the speed limits."""
-        speed = max(float(action[0]) * self.robot.max_speed, self.robot.min_speed)
-        return waiting(Twist(speed, float(action[1]) * self.robot.max_turn_rate))
+        robot = self.robot
+        speed = float(action[0]) * robot.max_speed
+        return waiting(clamp_twist(robot, speed, float(action[1]) * robot.max_turn_rate))
 
     def _from_twist(self, twist: Twist) -> FloatArray:
         return np.array(
@@ -162,9 +164,7 @@ class WheelsAction(ActionMode):
         """One command within the limits of speed and turn rate."""
         left, right = (float(value) * self.robot.max_speed for value in action)
         twist = self._twist(WheelSpeeds(left, right))
-        limit = self.robot.max_turn_rate
-        speed = max(twist.linear, self.robot.min_speed)
-        return waiting(Twist(speed, min(max(twist.angular, -limit), limit)))
+        return waiting(clamp_twist(self.robot, twist.linear, twist.angular))
 
     def _from_twist(self, twist: Twist) -> FloatArray:
         half = 0.5 * twist.angular * self.robot.wheel_separation

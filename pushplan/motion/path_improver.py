@@ -200,6 +200,7 @@ class PathImprover:
             goal=self._goal_of_paths,
             footprint=room.footprint,
             walls=room.walls,
+            reverses=self.world.robot.curves_back,
         )
 
     @property

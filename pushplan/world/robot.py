@@ -163,6 +163,11 @@ class RobotModel(ArrayRecord, CheckedFields):
         return self.min_turning_radius or self.max_speed / self.max_turn_rate
 
     @property
+    def curves_back(self) -> bool:
+        """True for a car that may reverse: its shortest curves lead ahead and back."""
+        return self.drive is Drive.CAR and self.min_speed < 0.0
+
+    @property
     def can_stop(self) -> bool:
         """True if the robot may stand."""
         return self.drive is not Drive.CONSTANT_SPEED

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "pushplan/motion/reeds_shepp.hpp"
 #include "pushplan/motion/shortcut.hpp"
 
 namespace pushplan {
@@ -81,7 +82,8 @@ ShortcutProposal propose_shortcut(const SweptPath& path, Index count, const Shor
   Index size = copy_start(old, first, out);
   const auto drive_to = [&](const Pose& stop) {
     const Pose here = out.poses[at(size - 1)];
-    const DubinsPath way = dubins(here, stop, problem.turning_radius);
+    const ShortestCurve way =
+        shortest_curve(here, stop, problem.turning_radius, problem.reverses);
     const Index added = sample_arcs(here, way.arcs, problem.spacing, out.from(size));
     if (added >= 0) size += added;
     return added >= 0;

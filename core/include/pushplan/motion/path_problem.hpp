@@ -21,6 +21,7 @@ struct PathProblem {
   GoalRegion goal;
   Footprint footprint;  // with its margin
   ConvexObstacles walls;
+  bool reverses = false;  // curves of shortcuts may lead back
 };
 
 /// A path with the K objects that it sweeps, in memory of somebody else that may be longer than the
