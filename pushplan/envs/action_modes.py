@@ -151,6 +151,27 @@ class VelocityAction(ActionMode):
         )
 
 
+class OmnidirectionalAction(ActionMode):
+    """Speeds ahead and to the left, times ``robot.max_speed``, and turn rate of any robot.
+
+    Where both speeds together are more than ``robot.max_speed`` the direction is kept.
+    """
+
+    size = 3
+
+    def start(self, action: FloatArray, world: World) -> Motion:
+        """One command within the limits of speed and turn rate."""
+        linear, lateral, angular = (float(value) for value in action)
+        speed = self.robot.max_speed
+        turn = angular * self.robot.max_turn_rate
+        return waiting(clamp_twist(self.robot, linear * speed, turn, lateral * speed))
+
+    def _from_twist(self, twist: Twist) -> FloatArray:
+        robot = self.robot
+        speeds = np.array([twist.linear, twist.lateral]) / robot.max_speed
+        return np.append(speeds, twist.angular / robot.max_turn_rate)
+
+
 class WheelsAction(ActionMode):
     """Rim speeds of the left and the right wheel, times ``robot.max_speed``.
 

@@ -16,6 +16,7 @@ from pushplan.geometry import VisibilityGraph
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_improver import PathImprover
 from pushplan.motion.path_search_config import EDGE, INSET
+from pushplan.motion.speed_profile import TIGHTEST
 from pushplan.world import GoalDisc
 from pushplan.world.checks import FloatArray
 
@@ -51,6 +52,8 @@ def along_guide(improver: PathImprover, *, around: bool = False) -> bool:
 
 def is_way(improver: PathImprover, vias: FloatArray) -> bool:
     """Return True if curves through vias (V, 3) are a path without a jam; the improver keeps it."""
+    if improver.world.robot.slides:
+        return improver.slides(vias[:, :2])
     return improver.drives(curves_through(improver, vias, improver.lead.pose))
 
 
@@ -62,6 +65,8 @@ def guides(improver: PathImprover, *, around: bool = False) -> Iterator[FloatArr
     if isinstance(goal, GoalDisc):
         depth = goal.radius - 0.99 * float(improver.room.goal[3])
     radius = improver.turning_radius
+    if improver.world.robot.slides:
+        radius = TIGHTEST * size  # it may follow every corner
     wide = max(_WIDE * size, _BEYOND_RADIUS * radius)
     for clearance in (wide, _NARROW * size):
         if improver.stopped():

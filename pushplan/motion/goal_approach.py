@@ -12,7 +12,7 @@ import numpy as np
 from pushplan.core import motion as core
 from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.keep_out import keep_out
-from pushplan.world import Drive, GoalPose, RobotModel, World
+from pushplan.world import GoalPose, RobotModel, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import arc_lengths
 
@@ -35,7 +35,7 @@ class PathEnd(NamedTuple):
 
 def turns_at_end(robot: RobotModel) -> bool:
     """Return True if the robot turns to the heading of its goal on the spot, where it has room."""
-    return robot.drive is Drive.DIFFERENTIAL
+    return robot.turns_on_spot
 
 
 def path_end(

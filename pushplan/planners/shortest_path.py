@@ -72,7 +72,9 @@ class ShortestPath:
                 return call.result(call.stopped_status, iterations=looks)
             if np.isfinite(path.length):
                 result = polyline_result(call, path.points, self.spacing, looks)
-                if robot.drive is Drive.CAR and result.status is not PlanStatus.SOLVED:
+                if (
+                    robot.drive is Drive.CAR or robot.slides
+                ) and result.status is not PlanStatus.SOLVED:
                     return _in_curves(call, looks) or result
                 return result
         if start_margin(world, 0.0) is None:
@@ -81,7 +83,7 @@ class ShortestPath:
 
 
 def _in_curves(call: PlanningCall, looks: int) -> PlanResult | None:
-    """The path in curves that a car can drive; None where they touch a wall."""
+    """The path as a car or an omnidirectional robot can drive it; None where it hits a wall."""
     alone = copy.copy(call)
     alone.world = replace(call.world, movables=Movables.empty())
     config = PathSearchConfig()
@@ -101,4 +103,6 @@ def _in_curves(call: PlanningCall, looks: int) -> PlanResult | None:
 
 def straight(planner: Planner | None = None) -> PlanFollower:
     """Follows the shortest path around the walls through whatever is in the way."""
-    return PlanFollower(planner or ShortestPath(), PlanController(follows=(Drive.CAR,)))
+    return PlanFollower(
+        planner or ShortestPath(), PlanController(follows=(Drive.CAR, Drive.OMNIDIRECTIONAL))
+    )

@@ -30,6 +30,8 @@ class Drive(enum.StrEnum):
     """Always forward at ``max_speed``; only the turn rate is free (Maze robot, ship)."""
     DIFFERENTIAL = "differential"
     """Forward speed in [min_speed, max_speed] and turn rate are free; may turn on the spot."""
+    OMNIDIRECTIONAL = "omnidirectional"
+    """Velocity in any direction up to ``max_speed``, and turn rate, are free."""
     CAR = "car"
     """Forward speed in [min_speed, max_speed] is free; turns on ``min_turning_radius`` at best."""
 
@@ -48,7 +50,7 @@ class RobotModel(ArrayRecord, CheckedFields):
         max_speed: greatest forward speed [m/s]; the speed itself for a constant-speed drive.
         max_turn_rate: greatest turn rate to either side [rad/s].
         min_speed: least forward speed [m/s], negative if it may reverse, else 0; a constant-speed
-            drive has none other than ``max_speed``.
+            drive has none other than ``max_speed``, an omnidirectional one its negative.
         max_acceleration: greatest change of the speed [m/s²]; infinite where speed can jump.
         max_turn_acceleration: greatest change of the turn rate [rad/s²].
         min_turning_radius: of a car, to the body origin, at any speed [m]; 0 for other drives.
@@ -89,6 +91,8 @@ class RobotModel(ArrayRecord, CheckedFields):
         put(self, "drive", Drive(choice("drive", self.drive, [d.value for d in Drive])))
         if self.drive is Drive.CONSTANT_SPEED:
             put(self, "min_speed", self.max_speed)
+        elif self.drive is Drive.OMNIDIRECTIONAL:
+            put(self, "min_speed", -self.max_speed)
         else:  # it has to be able to stop
             number("robot.min_speed", self.min_speed, high=0.0)
         if self.wheel_parts >= len(self.parts):
@@ -163,9 +167,19 @@ class RobotModel(ArrayRecord, CheckedFields):
         return self.min_turning_radius or self.max_speed / self.max_turn_rate
 
     @property
+    def slides(self) -> bool:
+        """True if the robot moves in any direction, whatever its heading."""
+        return self.drive is Drive.OMNIDIRECTIONAL
+
+    @property
     def curves_back(self) -> bool:
         """True for a car that may reverse: its shortest curves lead ahead and back."""
         return self.drive is Drive.CAR and self.min_speed < 0.0
+
+    @property
+    def turns_on_spot(self) -> bool:
+        """True if the robot may turn without driving."""
+        return self.drive in (Drive.DIFFERENTIAL, Drive.OMNIDIRECTIONAL)
 
     @property
     def can_stop(self) -> bool:

@@ -88,7 +88,7 @@ class RoomTask(Task):
     name = "room"
     presets = tuple(PRESETS)
     solid_presets = ("testbed",)
-    actions: ClassVar[tuple[str, ...]] = ("velocity", "wheels")
+    actions: ClassVar[tuple[str, ...]] = ("velocity", "wheels", "omnidirectional")
     observations: ClassVar[tuple[str, ...]] = ("image", "state")
 
     image_channels: tuple[str, ...] = ("footprint", "movable", "static", "goal_distance")

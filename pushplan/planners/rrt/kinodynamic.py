@@ -68,8 +68,9 @@ class KinodynamicRRT:
         status = improver.begin()
         if status is None:
             trees.look_ahead()
-            parks = improver.pose_goal is not None and world.robot.drive is Drive.CAR
-            if parks or is_far(improver) or len(improver.lead.pieces):
+            robot = improver.world.robot
+            parks = improver.pose_goal is not None and robot.drive is Drive.CAR
+            if parks or robot.slides or is_far(improver) or len(improver.lead.pieces):
                 warm_start(improver)
             status = _search(improver, trees) or call.stopped_status
         return improver.result(status, trees=float(trees.trees))

@@ -9,6 +9,13 @@
 
 namespace pushplan {
 
+/// The motion by which shortcuts lead from pose to pose.
+enum class Connection {
+  kDubins,      // arcs ahead
+  kReedsShepp,  // arcs ahead and back
+  kStraight     // straight in any direction, turning at an even rate
+};
+
 /// Costs and constraints of a path.
 struct PathProblem {
   double robot_mass;      // m0 [kg]
@@ -21,7 +28,7 @@ struct PathProblem {
   GoalRegion goal;
   Footprint footprint;  // with its margin
   ConvexObstacles walls;
-  bool reverses = false;  // curves of shortcuts may lead back
+  Connection connection = Connection::kDubins;
 };
 
 /// A path with the K objects that it sweeps, in memory of somebody else that may be longer than the
