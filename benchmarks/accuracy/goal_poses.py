@@ -36,10 +36,13 @@ def driven(world: World, planner: str) -> tuple[World, float]:
         command = runner.start(world)
         done = math.inf
         while world.time < min(PATIENCE_S, done + REST_S):
-            linear = command.twist.linear
+            speed, bearing = command.twist.course
             turn = command.twist.angular
-            pose = geometry.arc_step(world.robot_pose, linear * PERIOD_S, turn * PERIOD_S)
-            twist = [linear * math.cos(pose[2]), linear * math.sin(pose[2]), turn]
+            aside = np.array([0.0, 0.0, bearing])  # as if it drove ahead
+            begin = world.robot_pose + aside
+            end = np.array(geometry.arc_step(begin, speed * PERIOD_S, turn * PERIOD_S))
+            twist = [speed * math.cos(end[2]), speed * math.sin(end[2]), turn]
+            pose = end - aside
             world = world.moved(robot_pose=pose, robot_twist=twist, time=world.time + PERIOD_S)
             runner.update(world)
             command = runner.command(world.time)

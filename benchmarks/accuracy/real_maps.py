@@ -180,8 +180,9 @@ def barn_cases(folder: Path, robot: RobotModel, seed: int | None = None) -> Iter
 
 
 def drives() -> Iterator[RobotModel]:
-    """The Jackal, as a car with and without reverse and at a constant speed, and a small car."""
+    """The Jackal with its own drive and four others, and a small car."""
     yield jackal()
+    yield replace(jackal(drive=Drive.OMNIDIRECTIONAL), name="jackal, omnidirectional")
     car = jackal(drive=Drive.CAR, min_turning_radius=BARN_TURNS)
     yield replace(car, name="jackal as a car")
     yield replace(car, min_speed=-car.max_speed, name="jackal as a car that reverses")

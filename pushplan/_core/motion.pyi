@@ -107,19 +107,10 @@ class CollisionChecker:
 
     def depth(self, pose: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)]) -> float: ...
 
-class Connection(enum.Enum):
-    """The motion by which shortcuts connect two poses."""
-
-    DUBINS = 0
-
-    REEDS_SHEPP = 1
-
-    STRAIGHT = 2
-
 class PathProblem:
     """Costs and constraints of a path."""
 
-    def __init__(self, robot_mass: float, push_weight: float, turning_radius: float, spacing: float, jam_length: float, displacement: float, goal: Annotated[NDArray[numpy.float64], dict(shape=(5), order='C', device='cpu', writable=False)], footprint: Footprint, walls: ConvexObstacles, connection: Connection = Connection.DUBINS) -> None: ...
+    def __init__(self, robot_mass: float, push_weight: float, turning_radius: float, spacing: float, jam_length: float, displacement: float, goal: Annotated[NDArray[numpy.float64], dict(shape=(5), order='C', device='cpu', writable=False)], footprint: Footprint, walls: ConvexObstacles, reverses: bool = False, slides: bool = False) -> None: ...
 
 class SweptPath:
     """A path with the objects that it sweeps."""

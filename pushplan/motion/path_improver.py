@@ -28,7 +28,7 @@ from pushplan.motion.room_ahead import Room
 from pushplan.motion.speed_profile import TIGHTEST, goal_is_outside, start_margin, timed_plan
 from pushplan.motion.swept_path import SweptPath, make_swept_path
 from pushplan.motion.time_slicing import Pace
-from pushplan.world import Drive, GoalDisc, GoalPose, PlanResult, PlanStatus, RobotModel
+from pushplan.world import Drive, GoalDisc, GoalPose, PlanResult, PlanStatus
 from pushplan.world.checks import FloatArray
 from pushplan.world.planning_call import PlanningCall
 from pushplan.world.polyline import arc_lengths
@@ -204,7 +204,8 @@ class PathImprover:
             goal=self._goal_of_paths,
             footprint=room.footprint,
             walls=room.walls,
-            connection=_connection(self.world.robot),
+            reverses=self.world.robot.curves_back,
+            slides=self.world.robot.slides,
         )
 
     @property
@@ -450,12 +451,3 @@ class PathImprover:
             tight=float(self.tight),
             **detail,
         )
-
-
-def _connection(robot: RobotModel) -> core.Connection:
-    """The motion by which shortcuts of a robot connect two poses."""
-    if robot.slides:
-        return core.Connection.STRAIGHT
-    if robot.curves_back:
-        return core.Connection.REEDS_SHEPP
-    return core.Connection.DUBINS

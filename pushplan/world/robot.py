@@ -20,7 +20,15 @@ from pushplan.world.checked_fields import (
     PositiveFloat,
 )
 from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, choice, frozen, number
-from pushplan.world.outline import convex_outline, flatten, grown_outline, inscribed_radius
+from pushplan.world.outline import (
+    ConvexParts,
+    NotConvexError,
+    convex_outline,
+    flatten,
+    grown_outline,
+    inscribed_radius,
+    signed_area,
+)
 
 
 class Drive(enum.StrEnum):
@@ -44,7 +52,8 @@ class RobotModel(ArrayRecord, CheckedFields):
     """Footprint, mass and motion limits of a robot. Body frame: x forward, y left.
 
     Args:
-        parts: convex parts of the footprint as drawn, each (N, 2) corners in the body frame [m].
+        parts: parts of the footprint as drawn, each (N, 2) corners in the body frame [m]; concave
+            ones are kept as the convex parts of which they are the union.
         mass: mass as the metrics count it [kg].
         drive: how it may move.
         max_speed: greatest forward speed [m/s]; the speed itself for a constant-speed drive.
@@ -62,7 +71,7 @@ class RobotModel(ArrayRecord, CheckedFields):
         name: for logs and pictures.
 
     Raises:
-        InvalidInputError: if a part is not convex or a limit has no sense.
+        InvalidInputError: if a part has no area or a limit has no sense.
     """
 
     field_prefix = "robot."
@@ -86,8 +95,8 @@ class RobotModel(ArrayRecord, CheckedFields):
             raise InvalidInputError("robot.parts must be a non-empty list of convex outlines")
         super().__post_init__()
         put = object.__setattr__
-        parts = [convex_outline(f"robot.parts[{i}]", p) for i, p in enumerate(self.parts)]
-        put(self, "parts", tuple(parts))
+        cut = [_convex_parts(f"robot.parts[{i}]", part) for i, part in enumerate(self.parts)]
+        put(self, "parts", tuple(part for pieces in cut for part in pieces))
         put(self, "drive", Drive(choice("drive", self.drive, [d.value for d in Drive])))
         if self.drive is Drive.CONSTANT_SPEED:
             put(self, "min_speed", self.max_speed)
@@ -95,11 +104,12 @@ class RobotModel(ArrayRecord, CheckedFields):
             put(self, "min_speed", -self.max_speed)
         else:  # it has to be able to stop
             number("robot.min_speed", self.min_speed, high=0.0)
-        if self.wheel_parts >= len(self.parts):
+        if self.wheel_parts >= len(cut):
             raise InvalidInputError(
-                f"robot.wheel_parts must be less than the number of parts, {len(self.parts)}, "
+                f"robot.wheel_parts must be less than the number of parts, {len(cut)}, "
                 f"got {self.wheel_parts}"
             )
+        put(self, "wheel_parts", sum(map(len, cut[len(cut) - self.wheel_parts :])))
         if (self.drive is Drive.CAR) != (self.min_turning_radius > 0.0):
             raise InvalidInputError(
                 "robot.min_turning_radius must be positive for a car and 0 for other drives, "
@@ -108,7 +118,7 @@ class RobotModel(ArrayRecord, CheckedFields):
 
     @classmethod
     def from_outline(cls, outline: ArrayLike, **limits: object) -> RobotModel:
-        """A robot whose footprint is one convex outline (N, 2) [m]; the rest as in the class."""
+        """A robot whose footprint is one outline (N, 2) [m]; the rest as in the class."""
         return cls(parts=(outline,), **limits)  # type: ignore[arg-type]
 
     def inflated(self, margin: float) -> RobotModel:
@@ -185,3 +195,14 @@ class RobotModel(ArrayRecord, CheckedFields):
     def can_stop(self) -> bool:
         """True if the robot may stand."""
         return self.drive is not Drive.CONSTANT_SPEED
+
+
+def _convex_parts(name: str, outline: ArrayLike) -> ConvexParts:
+    """The convex parts of an outline, concave or not; the largest first, as it may be a chassis."""
+    try:
+        return (convex_outline(name, outline),)
+    except NotConvexError:
+        from pushplan.world.outline_repair import cut_outlines  # loads Shapely
+
+        pieces = cut_outlines(name, [outline], lambda _: name)[0]
+        return tuple(sorted(pieces, key=signed_area, reverse=True))
