@@ -134,8 +134,7 @@ void bind_envs(nb::module_& module) {
           "to"_a.noconvert(), "motion"_a.noconvert(), "length"_a, "duration"_a,
           "Drive straight to a pose; False if the robot was held.")
       .def("clear_for", &PlanarSimulator::clear_for, "linear"_a, "angular"_a, "lateral"_a,
-           "limit"_a,
-           "Time [s] for which the robot certainly touches nothing.")
+           "limit"_a, "Time [s] for which the robot certainly touches nothing.")
       .def_prop_ro("loaded", &PlanarSimulator::loaded,
                    "Number of objects that the last step needed the engine for.")
       .def_rw("loads_all", &PlanarSimulator::loads_all,

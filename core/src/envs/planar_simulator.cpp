@@ -74,8 +74,8 @@ void PlanarSimulator::step(double ahead, double angular, double lateral, double 
   const Index left = samples - free;
   const double rest = duration * static_cast<double>(left) / count;
   choose(speed * rest, duration);
-  const DriveStep drive{linear, angular, rest, motion.course, motion.bearing, motion.holds,
-                        left,   each};
+  const DriveStep drive{linear,         angular,      rest, motion.course,
+                        motion.bearing, motion.holds, left, each};
   simulate(left, [&] { drive_.run(drive, active_, start_, driven_); });
 }
 

@@ -73,10 +73,10 @@ class WordSearch {
       const double turn =
           std::atan2(middle * other_x - 2.0 * other_y, -2.0 * other_x - middle * other_y);
       keep({{{turn, kLeft},
-            {-kQuarter, kRight},
-            {4.0 - middle, kStraight},
-            {-kQuarter, kLeft},
-            {turn - phi, kRight}}});  // (8.11)
+             {-kQuarter, kRight},
+             {4.0 - middle, kStraight},
+             {-kQuarter, kLeft},
+             {turn - phi, kRight}}});  // (8.11)
     }
     const double apart = 0.25 * (2.0 + std::sqrt(square));
     if (apart <= 1.0) {
@@ -108,9 +108,9 @@ class WordSearch {
       const double along = std::sqrt(same * same - 4.0);
       const double first = bearing + std::atan2(along, -2.0);
       keep({{{first, kLeft},
-            {-kQuarter, kRight},
-            {2.0 - along, kStraight},
-            {phi - kQuarter - first, kLeft}}});  // (8.9)
+             {-kQuarter, kRight},
+             {2.0 - along, kStraight},
+             {phi - kQuarter - first, kLeft}}});  // (8.9)
     }
     const double other_x = x + sine;
     const double other_y = y - 1.0 - cosine;
@@ -118,9 +118,9 @@ class WordSearch {
     if (other >= 2.0) {
       const double first = std::atan2(other_x, -other_y);
       keep({{{first, kLeft},
-            {-kQuarter, kRight},
-            {2.0 - other, kStraight},
-            {first + kQuarter - phi, kRight}}});  // (8.10)
+             {-kQuarter, kRight},
+             {2.0 - other, kStraight},
+             {first + kQuarter - phi, kRight}}});  // (8.10)
     }
   }
 
@@ -177,8 +177,8 @@ ShortestCurve reeds_shepp(const Pose& start, const Pose& end, double radius) {
   const double dy = (end.y - start.y) / radius;
   const double cosine = std::cos(start.theta);
   const double sine = std::sin(start.theta);
-  WordSearch search({dx * cosine + dy * sine, dy * cosine - dx * sine,
-                     wrap_below_pi(end.theta - start.theta)});
+  WordSearch search(
+      {dx * cosine + dy * sine, dy * cosine - dx * sine, wrap_below_pi(end.theta - start.theta)});
   search.run();
   ShortestCurve curve{search.best(), radius * search.length()};
   for (Arc& arc : curve.arcs) {
