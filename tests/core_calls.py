@@ -172,7 +172,7 @@ VALID: dict[str, Any] = {
     "interaction.cover_objects.out": np.zeros((4, 4)),
     "interaction.cover_sweep.out": np.zeros((4, 4)),
     # motion
-    "motion.dubins.arcs": np.zeros((3, 2)),
+    "motion.shortest_curve.arcs": np.zeros((5, 2)),
     "motion.sample_pieces.out": np.zeros((30, 3)),
     "motion.sample_pieces.curvatures": np.zeros(30),
     "motion.prefix_sums.sums": np.zeros((4, 7)),

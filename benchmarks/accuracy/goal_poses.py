@@ -36,10 +36,13 @@ def driven(world: World, planner: str) -> tuple[World, float]:
         command = runner.start(world)
         done = math.inf
         while world.time < min(PATIENCE_S, done + REST_S):
-            linear = command.twist.linear
+            speed, bearing = command.twist.course
             turn = command.twist.angular
-            pose = geometry.arc_step(world.robot_pose, linear * PERIOD_S, turn * PERIOD_S)
-            twist = [linear * math.cos(pose[2]), linear * math.sin(pose[2]), turn]
+            aside = np.array([0.0, 0.0, bearing])  # as if it drove ahead
+            begin = world.robot_pose + aside
+            end = np.array(geometry.arc_step(begin, speed * PERIOD_S, turn * PERIOD_S))
+            twist = [speed * math.cos(end[2]), speed * math.sin(end[2]), turn]
+            pose = end - aside
             world = world.moved(robot_pose=pose, robot_twist=twist, time=world.time + PERIOD_S)
             runner.update(world)
             command = runner.command(world.time)
@@ -59,8 +62,6 @@ def main() -> None:
         if not robot.can_stop:
             continue
         for planner in PLANNERS:
-            if planner == "straight" and robot.min_turning_radius:
-                continue  # pure pursuit of a polyline
             cases = islice(barn_cases(options.barn, robot, options.seed), options.worlds)
             ends = [driven(case.world, planner) for case in cases]
             goals = [world.goal for world, _ in ends if isinstance(world.goal, GoalPose)]

@@ -6,7 +6,7 @@
 --barn holds worlds of the BARN challenge, worlds.npz: `cylinders` (N, 3) x, y, radius [m],
 `offsets` (W + 1,) rows of each world, `first` its number; and paths.npz, with reference paths
 `path_I` (P, 2) in cells of the generator. With --heading the goal is a pose, to 2 cm and 3°, in
-the middle of the goal's disc at a random heading, and two drives more plan that cannot turn on the
+the middle of the goal's disc at a random heading, and robots plan, too, that cannot turn on the
 spot. --nav2 holds maps of ROS's map server.
 
 Times are CPU time until the first plan [ms]. Shapely checks plans without pushplan's own collision
@@ -47,6 +47,7 @@ from pushplan.world import (
     World,
     jackal,
     load_nav2_map,
+    racecar,
     turtlebot3_burger,
 )
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
@@ -179,10 +180,13 @@ def barn_cases(folder: Path, robot: RobotModel, seed: int | None = None) -> Iter
 
 
 def drives() -> Iterator[RobotModel]:
-    """The Jackal, the same as a car, and at a constant speed."""
+    """The Jackal with its own drive and four others, and a small car."""
     yield jackal()
+    yield replace(jackal(drive=Drive.OMNIDIRECTIONAL), name="jackal, omnidirectional")
     car = jackal(drive=Drive.CAR, min_turning_radius=BARN_TURNS)
     yield replace(car, name="jackal as a car")
+    yield replace(car, min_speed=-car.max_speed, name="jackal as a car that reverses")
+    yield racecar()
     rate = jackal().max_speed / BARN_TURNS
     constant = jackal(
         drive=Drive.CONSTANT_SPEED, max_turn_rate=rate, max_turn_acceleration=math.inf

@@ -119,11 +119,12 @@ void bind_envs(nb::module_& module) {
           nb::keep_alive<1, 12>())
       .def(
           "step",
-          [](PlanarSimulator& self, double linear, double angular, double duration) {
-            self.step(linear, angular, duration);
+          [](PlanarSimulator& self, double linear, double angular, double lateral,
+             double duration) {
+            self.step(linear, angular, lateral, duration);
             return recorded(self);
           },
-          "linear"_a, "angular"_a, "duration"_a,
+          "linear"_a, "angular"_a, "lateral"_a, "duration"_a,
           "Poses (T, 3) of the robot and (T, K, 3) of the objects in a step; whether the robot was\n"
           "held, and touched something static.")
       .def(
@@ -132,8 +133,8 @@ void bind_envs(nb::module_& module) {
              double duration) { return self.sweep(pose(to), pose(motion), length, duration); },
           "to"_a.noconvert(), "motion"_a.noconvert(), "length"_a, "duration"_a,
           "Drive straight to a pose; False if the robot was held.")
-      .def("clear_for", &PlanarSimulator::clear_for, "linear"_a, "angular"_a, "limit"_a,
-           "Time [s] for which the robot certainly touches nothing.")
+      .def("clear_for", &PlanarSimulator::clear_for, "linear"_a, "angular"_a, "lateral"_a,
+           "limit"_a, "Time [s] for which the robot certainly touches nothing.")
       .def_prop_ro("loaded", &PlanarSimulator::loaded,
                    "Number of objects that the last step needed the engine for.")
       .def_rw("loads_all", &PlanarSimulator::loads_all,

@@ -7,6 +7,7 @@
 #include "arrays.hpp"
 #include "goal.hpp"
 #include "pushplan/motion/goal_region.hpp"
+#include "pushplan/motion/reeds_shepp.hpp"
 #include "pushplan/motion/state_lattice/cost_map.hpp"
 #include "pushplan/motion/state_lattice/place_costs.hpp"
 #include "pushplan/motion/state_lattice/pose_lattice.hpp"
@@ -28,7 +29,7 @@ PathBuffer buffer(const PosesOut& out, const FloatsOut<1>& curvatures) {
   return {poses(out), view(curvatures)};
 }
 
-using ThreeArcs = nb::ndarray<double, nb::shape<3, 2>, nb::c_contig, nb::device::cpu>;
+using FiveArcs = nb::ndarray<double, nb::shape<5, 2>, nb::c_contig, nb::device::cpu>;
 
 /// The numbers of `PoseLattice.goal` of Python.
 LatticeGoal lattice_goal(const Numbers<4>& numbers) {
@@ -38,13 +39,14 @@ LatticeGoal lattice_goal(const Numbers<4>& numbers) {
 
 void bind_paths(nb::module_& module) {
   module.def(
-      "dubins",
-      [](const OnePose& start, const OnePose& end, double radius, const ThreeArcs& arcs) {
-        const DubinsPath path = dubins(pose(start), pose(end), radius);
-        std::copy(path.arcs.begin(), path.arcs.end(), reinterpret_cast<Arc*>(arcs.data()));
-        return path.length;
+      "shortest_curve",
+      [](const OnePose& start, const OnePose& end, double radius, bool reverses,
+         const FiveArcs& arcs) {
+        const ShortestCurve curve = shortest_curve(pose(start), pose(end), radius, reverses);
+        std::copy(curve.arcs.begin(), curve.arcs.end(), reinterpret_cast<Arc*>(arcs.data()));
+        return curve.length;
       },
-      "start"_a.noconvert(), "end"_a.noconvert(), "radius"_a, "arcs"_a.noconvert());
+      "start"_a.noconvert(), "end"_a.noconvert(), "radius"_a, "reverses"_a, "arcs"_a.noconvert());
   module.def(
       "along_arc",
       [](const OnePose& start, double length, double curvature, const OnePoseOut& out) {

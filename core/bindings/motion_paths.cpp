@@ -144,16 +144,19 @@ void bind_problems(nb::module_& module) {
           "__init__",
           [](PathProblem* self, double robot_mass, double push_weight, double turning_radius,
              double spacing, double jam_length, double displacement, const Numbers<5>& goal,
-             const Footprint& footprint, const ConvexObstacles& walls, const PriceGrid* price) {
+             const Footprint& footprint, const ConvexObstacles& walls, const PriceGrid* price,
+             bool reverses, bool slides) {
+            const Connection curves = reverses ? Connection::kReedsShepp : Connection::kDubins;
+            const Connection connection = slides ? Connection::kStraight : curves;
             new (self)
                 PathProblem{robot_mass,   push_weight,       turning_radius, spacing, jam_length,
-                            displacement, goal_region(goal), footprint,      walls};
+                            displacement, goal_region(goal), footprint,      walls,   connection};
             if (price != nullptr) self->price = *price;
           },
           "robot_mass"_a, "push_weight"_a, "turning_radius"_a, "spacing"_a, "jam_length"_a,
           "displacement"_a, "goal"_a.noconvert(), "footprint"_a, "walls"_a,
-          "price"_a = nb::none(), nb::keep_alive<1, 9>(), nb::keep_alive<1, 10>(),
-          nb::keep_alive<1, 11>());
+          "price"_a = nb::none(), "reverses"_a = false, "slides"_a = false,
+          nb::keep_alive<1, 9>(), nb::keep_alive<1, 10>(), nb::keep_alive<1, 11>());
   nb::class_<SweptPath>(module, "SweptPath", "A path with the objects that it sweeps.")
       .def(
           "__init__",

@@ -8,6 +8,7 @@
 #include "pushplan/motion/collision.hpp"
 #include "pushplan/motion/dubins.hpp"
 #include "pushplan/motion/random_tree/steering.hpp"
+#include "pushplan/motion/reeds_shepp.hpp"
 #include "pushplan/motion/room_ahead.hpp"
 #include "pushplan/motion/state_lattice/cost_map.hpp"
 #include "pushplan/motion/state_lattice/primitives.hpp"
@@ -58,6 +59,27 @@ void dubins_paths_end_at_the_goal() {
     CHECK(sample_arcs(start, path.arcs, 0.1, PathBuffer{poses, curvatures}.from(1999)) <= 1);
   }
   CHECK(near_to(dubins({0.0, 0.0, 0.0}, {2.0, 0.0, 0.0}, kRadius).length, 2.0));
+}
+
+/// Curves that may lead back end at the goal, and none is longer than the Dubins path.
+void reeds_shepp_curves_end_at_the_goal() {
+  Xorshift64Star random(2);
+  constexpr double kRadius = 0.7;
+  for (int trial = 0; trial < 500; ++trial) {
+    const Pose start = random_pose(random, 3.0);
+    const Pose end = random_pose(random, 3.0);
+    const ShortestCurve curve = reeds_shepp(start, end, kRadius);
+    Pose at = start;
+    double length = 0.0;
+    for (const Arc& arc : curve.arcs) {
+      at = along_arc(at, arc);
+      length += std::abs(arc.length);
+      CHECK(std::abs(arc.curvature) <= 1.0 / kRadius + 1e-12);
+    }
+    CHECK(same_place(at, end, 1e-6) && near_to(length, curve.length));
+    CHECK(length <= dubins(start, end, kRadius).length + 1e-9);
+    CHECK(near_to(reeds_shepp(end, start, kRadius).length, length, 1e-6));
+  }
 }
 
 /// Walls for footprints, in groups as `ConvexObstacles` wants them.
@@ -180,6 +202,7 @@ void primitives_join_lattice_points() {
 
 int main() {
   pushplan::dubins_paths_end_at_the_goal();
+  pushplan::reeds_shepp_curves_end_at_the_goal();
   pushplan::checks_find_every_overlap();
   pushplan::rooms_are_left_by_their_gaps();
   pushplan::primitives_join_lattice_points();

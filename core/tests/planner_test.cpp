@@ -48,7 +48,7 @@ bool is_free(const World& world, const Plan& plan) {
   const std::array<Index, 3> two{0, 4, 8};
   std::vector<Vec2> walls = world.walls[0];
   walls.insert(walls.end(), world.walls[1].begin(), world.walls[1].end());
-  const std::array boxes{tests::box_around(world.walls[0]), tests::box_around(world.walls[1])};
+  const std::array boxes{box_around(world.walls[0]), box_around(world.walls[1])};
   const std::array groups{world.bounds};
   CollisionChecker checker({{world.robot.parts[0], one}, 0.37},
                            {{walls, two}, boxes, groups, world.bounds});

@@ -51,15 +51,6 @@ inline double radius_of(Polygon polygon) {
   return radius;
 }
 
-inline Box box_around(Polygon polygon) {
-  Box box{polygon[0].x, polygon[0].y, polygon[0].x, polygon[0].y};
-  for (const Vec2 corner : polygon) {
-    box = {std::min(box.x_min, corner.x), std::min(box.y_min, corner.y),
-           std::max(box.x_max, corner.x), std::max(box.y_max, corner.y)};
-  }
-  return box;
-}
-
 /// Polygons with their radii about the origin and the boxes around them.
 struct Shapes {
   std::vector<Vec2> vertices;

@@ -30,7 +30,7 @@ class PlanarSimulator:
 
     def __init__(self, functions: Sequence[int], space: int, bodies: Sequence[int], shapes: Sequence[Sequence[int]], owner: object, reach: Reach, obstacles: pushplan._core.geometry.Obstacles, keeps: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], inertia: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], drag: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], states: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu')], travel: float, tolerance: float, rest: float, decay: float, samples: int, holds: bool) -> None: ...
 
-    def step(self, linear: float, angular: float, duration: float) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C')], bool, bool]:
+    def step(self, linear: float, angular: float, lateral: float, duration: float) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C')], bool, bool]:
         """
         Poses (T, 3) of the robot and (T, K, 3) of the objects in a step; whether the robot was
         held, and touched something static.
@@ -39,7 +39,7 @@ class PlanarSimulator:
     def sweep(self, to: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], motion: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], length: float, duration: float) -> bool:
         """Drive straight to a pose; False if the robot was held."""
 
-    def clear_for(self, linear: float, angular: float, limit: float) -> float:
+    def clear_for(self, linear: float, angular: float, lateral: float, limit: float) -> float:
         """Time [s] for which the robot certainly touches nothing."""
 
     @property

@@ -10,7 +10,7 @@ import pushplan._core.interaction
 import pushplan._core.search
 
 
-def dubins(start: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], end: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], radius: float, arcs: Annotated[NDArray[numpy.float64], dict(shape=(3, 2), order='C', device='cpu')]) -> float: ...
+def shortest_curve(start: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], end: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], radius: float, reverses: bool, arcs: Annotated[NDArray[numpy.float64], dict(shape=(5, 2), order='C', device='cpu')]) -> float: ...
 
 def along_arc(start: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)], length: float, curvature: float, out: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu')]) -> None: ...
 
@@ -115,7 +115,7 @@ class PriceGrid:
 class PathProblem:
     """Costs and constraints of a path."""
 
-    def __init__(self, robot_mass: float, push_weight: float, turning_radius: float, spacing: float, jam_length: float, displacement: float, goal: Annotated[NDArray[numpy.float64], dict(shape=(5), order='C', device='cpu', writable=False)], footprint: Footprint, walls: ConvexObstacles, price: PriceGrid | None = None) -> None: ...
+    def __init__(self, robot_mass: float, push_weight: float, turning_radius: float, spacing: float, jam_length: float, displacement: float, goal: Annotated[NDArray[numpy.float64], dict(shape=(5), order='C', device='cpu', writable=False)], footprint: Footprint, walls: ConvexObstacles, price: PriceGrid | None = None, reverses: bool = False, slides: bool = False) -> None: ...
 
 class SweptPath:
     """A path with the objects that it sweeps."""

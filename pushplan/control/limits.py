@@ -12,10 +12,11 @@ try:
 except ImportError:
     ruckig = None
 
+_ENDLESS = 1e9  # speed that stands for an infinite one [m/s]
 _BRAKES = 0.5  # fraction of the greatest deceleration that an end is approached with
 
 
-def clamp_twist(robot: RobotModel, linear: float, angular: float) -> Twist:
+def clamp_twist(robot: RobotModel, linear: float, angular: float, lateral: float = 0.0) -> Twist:
     """The nearest twist that the robot's speed and turn limits allow.
 
     Args:
@@ -23,10 +24,17 @@ def clamp_twist(robot: RobotModel, linear: float, angular: float) -> Twist:
             turns as its speed allows.
         linear: wanted forward speed [m/s].
         angular: wanted turn rate [rad/s].
+        lateral: wanted speed to the left [m/s], of an omnidirectional robot.
     """
     expect("robot", robot, RobotModel)
     linear = number("linear", linear, finite=False)
     angular = number("angular", angular, finite=False)
+    if robot.drive is Drive.OMNIDIRECTIONAL:
+        lateral = number("lateral", lateral, finite=False)
+        linear, lateral = (min(max(v, -_ENDLESS), _ENDLESS) for v in (linear, lateral))
+        slower = min(1.0, robot.max_speed / max(math.hypot(linear, lateral), 1e-12))
+        turn = min(max(angular, -robot.max_turn_rate), robot.max_turn_rate)
+        return Twist(slower * linear, turn, slower * lateral)
     if robot.drive is Drive.CONSTANT_SPEED:
         linear = robot.max_speed
     linear = min(max(linear, robot.min_speed), robot.max_speed)
@@ -58,7 +66,12 @@ def arc_twist(robot: RobotModel, length: float, turn: float, least: float = 0.0)
 
 
 def ramp_twist(
-    robot: RobotModel, last: Twist, linear: float, angular: float, period: float
+    robot: RobotModel,
+    last: Twist,
+    linear: float,
+    angular: float,
+    period: float,
+    lateral: float = 0.0,
 ) -> Twist:
     """The nearest twist that speeds and accelerations allow after the last one.
 
@@ -70,12 +83,17 @@ def ramp_twist(
         linear: wanted forward speed [m/s].
         angular: wanted turn rate [rad/s].
         period: time for which it is held [s].
+        lateral: wanted speed to the left [m/s], of an omnidirectional robot.
     """
     dv = robot.max_acceleration * period
     dw = robot.max_turn_acceleration * period
+    change = math.hypot(linear - last.linear, lateral - last.lateral)
+    if robot.drive is Drive.OMNIDIRECTIONAL and change > dv:
+        linear = last.linear + (linear - last.linear) * dv / change
+        lateral = last.lateral + (lateral - last.lateral) * dv / change
     linear = min(max(linear, last.linear - dv), last.linear + dv)
     angular = min(max(angular, last.angular - dw), last.angular + dw)
-    return clamp_twist(robot, linear, angular)
+    return clamp_twist(robot, linear, angular, lateral)
 
 
 def approach_speed(left: float, deceleration: float, held: float) -> float:
@@ -94,7 +112,9 @@ def driven_twist(world: World) -> Twist:
     assert world.robot_twist is not None
     vx, vy, omega = (float(value) for value in world.robot_twist)
     theta = float(world.robot_pose[2])
-    return clamp_twist(world.robot, vx * math.cos(theta) + vy * math.sin(theta), omega)
+    c = math.cos(theta)
+    s = math.sin(theta)
+    return clamp_twist(world.robot, vx * c + vy * s, omega, vy * c - vx * s)
 
 
 class TwistLimiter:

@@ -10,12 +10,14 @@ from dataclasses import replace
 import numpy as np
 
 from pushplan.control.episode_clock import EpisodeClock
-from pushplan.control.limits import approach_speed, ramp_twist
+from pushplan.control.limits import approach_speed, clamp_twist, ramp_twist
 from pushplan.control.tracking import Progress
 from pushplan.world import GoalPose, Plan, RobotModel, Stage, Twist, World
 from pushplan.world.checks import expect
 
 _WINDOW = 2.0  # of its progress [circumscribed radii]
+_CUT = 0.02  # distance by which it may cut a corner [circumscribed radii]
+_RESPONSE = 0.3  # time in which an omnidirectional robot drives off an error [s]
 
 
 class StagedController(ABC):
@@ -24,7 +26,8 @@ class StagedController(ABC):
     Of a stage that goes back `_follow` sees the mirror image: a robot whose front is its rear, on a
     path that it drives ahead. Before a stage that another one follows is over, and before a pose
     that is the robot's goal, it slows down so that it comes to a stand there. Of a plan of one
-    stage that is driven ahead it sees the plan as it is.
+    stage that is driven ahead it sees the plan as it is. An omnidirectional robot
+    moves along its plan at the headings of the poses, whatever the kind of controller.
     """
 
     @abstractmethod
@@ -66,7 +69,7 @@ class StagedController(ABC):
 
     def _by_stages(self, world: World, plan: Plan) -> Twist:
         simple = len(plan.stages) == 1 and plan.stages[0].direction == 1
-        if simple and not isinstance(world.goal, GoalPose):
+        if simple and not (isinstance(world.goal, GoalPose) or world.robot.slides):
             self._take_up(1)
             return self._follow(world, plan)
         robot = world.robot
@@ -82,7 +85,8 @@ class StagedController(ABC):
             self._part = None
         wanted = self._on_stage(world, plan, stage, self._place)
         last = self._clock.command
-        return ramp_twist(robot, last, wanted.linear, wanted.angular, self._clock.held)
+        held = self._clock.held
+        return ramp_twist(robot, last, wanted.linear, wanted.angular, held, wanted.lateral)
 
     def _take_up(self, direction: int) -> None:
         """Begin anew where another direction begins."""
@@ -97,6 +101,8 @@ class StagedController(ABC):
             side = math.copysign(1.0, float(plan.turn_rates[stage.first]))
             left = progress.left_to_turn
             return Twist(0.0, side * approach_speed(left, robot.max_turn_acceleration, held))
+        if robot.slides:
+            return _slide(world, plan, progress, held)
         if self._part is None:
             self._part = _part(plan, stage)
         if stage.direction < 0:
@@ -111,6 +117,45 @@ class StagedController(ABC):
             return wanted
         slower = fastest / abs(wanted.linear)
         return Twist(slower * wanted.linear, slower * wanted.angular)
+
+
+def _slide(world: World, plan: Plan, progress: Progress, held: float) -> Twist:
+    """The velocity of an omnidirectional robot along a stage, at the headings of the plan.
+
+    It is that of the plan and, for what is left of the error, back to the path.
+    """
+    left = progress.left_of_stage
+    speed = float(plan.speeds[progress.index(progress.along)])
+    speed = min(speed, approach_speed(left, world.robot.max_acceleration, held))
+    place = progress.pose(progress.along)
+    reach = min(speed * held, left)
+    while _cuts(plan, progress, reach) > _CUT * world.robot.circumscribed_radius:
+        reach *= 0.5
+    aim = progress.pose(progress.along + reach)
+    response = max(held, _RESPONSE)
+    ahead = (aim - place) / held
+    back = (place - world.robot_pose) / response
+    vx, vy = ahead[:2] + back[:2]
+    theta = float(world.robot_pose[2])
+    turn = math.remainder(float(aim[2] - place[2]), math.tau) / held
+    turn += math.remainder(float(place[2]) - theta, math.tau) / response
+    most = world.robot.max_turn_rate
+    turn = min(max(turn, -most), most)
+    middle = theta + 0.5 * turn * held
+    c = math.cos(middle)
+    s = math.sin(middle)
+    return clamp_twist(world.robot, vx * c + vy * s, turn, vy * c - vx * s)
+
+
+def _cuts(plan: Plan, progress: Progress, reach: float) -> float:
+    """Greatest distance [m] of a plan from the straight way to what is ``reach`` [m] ahead."""
+    first = progress.index(progress.along) + 1
+    last = progress.index(progress.along + reach) + 1
+    start = progress.pose(progress.along)[:2]
+    along = progress.pose(progress.along + reach)[:2] - start
+    off = plan.poses[first:last, :2] - start
+    across = np.abs(off[:, 0] * along[1] - off[:, 1] * along[0])
+    return float(across.max(initial=0.0)) / max(math.hypot(*along), 1e-12)
 
 
 def _part(plan: Plan, stage: Stage) -> Plan:

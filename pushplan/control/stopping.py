@@ -16,7 +16,22 @@ _STEP = 0.15
 _BRAKING_STEPS = 50
 
 
-def add_arc(poses: list[FloatArray], length: float, turn: float, size: float) -> None:
+def add_twist(poses: list[FloatArray], twist: Twist, seconds: float, size: float) -> None:
+    """Append the poses of a velocity that is held, in short steps, from the last pose on.
+
+    Args:
+        poses: each (3,); at least one.
+        twist: the velocity.
+        seconds: for how long it is held [s].
+        size: circumscribed radius of the robot [m].
+    """
+    speed, bearing = twist.course
+    add_arc(poses, speed * seconds, twist.angular * seconds, size, bearing)
+
+
+def add_arc(
+    poses: list[FloatArray], length: float, turn: float, size: float, bearing: float = 0.0
+) -> None:
     """Append the poses of an arc in short steps, from the last pose on.
 
     Args:
@@ -24,10 +39,13 @@ def add_arc(poses: list[FloatArray], length: float, turn: float, size: float) ->
         length: of the arc, negative for back [m].
         turn: on it [rad].
         size: circumscribed radius of the robot [m].
+        bearing: of its beginning in the body frame [rad].
     """
+    aside = np.array([0.0, 0.0, bearing])
     steps = math.ceil(max(abs(length) / (_STEP * size), abs(turn) / _STEP))
     for _ in range(steps):
-        poses.append(np.array(geometry.arc_step(poses[-1], length / steps, turn / steps)))
+        ahead = poses[-1] + aside  # as if it drove ahead
+        poses.append(np.array(geometry.arc_step(ahead, length / steps, turn / steps)) - aside)
 
 
 def stopping_path(
@@ -45,13 +63,13 @@ def stopping_path(
     Returns:
         (N, 3) poses up to where it stands, the first one included.
     """
-    seconds = abs(twist.linear) / robot.max_acceleration
+    seconds = abs(twist.course[0]) / robot.max_acceleration
     seconds = max(seconds, abs(twist.angular) / robot.max_turn_acceleration)
     step = max(period, seconds / _BRAKING_STEPS)
     held += 0.5 * (step - period)  # longer steps brake too early
     poses = [np.array(pose, dtype=np.float64)]
-    while twist.linear or twist.angular:
-        add_arc(poses, twist.linear * held, twist.angular * held, robot.circumscribed_radius)
+    while twist.linear or twist.angular or twist.lateral:
+        add_twist(poses, twist, held, robot.circumscribed_radius)
         twist = ramp_twist(robot, twist, 0.0, 0.0, step)
         held = step
     return np.array(poses)

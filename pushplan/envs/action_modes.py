@@ -10,6 +10,7 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
+from pushplan.control import clamp_twist
 from pushplan.envs.tasks.base import Task
 from pushplan.world import Action, InvalidInputError, Twist, UnknownNameError, WheelSpeeds, World
 from pushplan.world.checks import FloatArray, is_finite
@@ -134,19 +135,41 @@ class TurnRateAction(ActionMode):
 
 
 class VelocityAction(ActionMode):
-    """Forward speed and turn rate of a differential drive, times the robot's limits."""
+    """Forward speed and turn rate, times the robot's limits; a car turns as its speed allows."""
 
     size = 2
 
     def start(self, action: FloatArray, world: World) -> Motion:
         """One command within the speed limits."""
-        speed = max(float(action[0]) * self.robot.max_speed, self.robot.min_speed)
-        return waiting(Twist(speed, float(action[1]) * self.robot.max_turn_rate))
+        robot = self.robot
+        speed = float(action[0]) * robot.max_speed
+        return waiting(clamp_twist(robot, speed, float(action[1]) * robot.max_turn_rate))
 
     def _from_twist(self, twist: Twist) -> FloatArray:
         return np.array(
             [twist.linear / self.robot.max_speed, twist.angular / self.robot.max_turn_rate]
         )
+
+
+class OmnidirectionalAction(ActionMode):
+    """Speeds ahead and to the left, times ``robot.max_speed``, and turn rate of any robot.
+
+    Where both speeds together are more than ``robot.max_speed`` the direction is kept.
+    """
+
+    size = 3
+
+    def start(self, action: FloatArray, world: World) -> Motion:
+        """One command within the limits of speed and turn rate."""
+        linear, lateral, angular = (float(value) for value in action)
+        speed = self.robot.max_speed
+        turn = angular * self.robot.max_turn_rate
+        return waiting(clamp_twist(self.robot, linear * speed, turn, lateral * speed))
+
+    def _from_twist(self, twist: Twist) -> FloatArray:
+        robot = self.robot
+        speeds = np.array([twist.linear, twist.lateral]) / robot.max_speed
+        return np.append(speeds, twist.angular / robot.max_turn_rate)
 
 
 class WheelsAction(ActionMode):
@@ -162,9 +185,7 @@ class WheelsAction(ActionMode):
         """One command within the limits of speed and turn rate."""
         left, right = (float(value) * self.robot.max_speed for value in action)
         twist = self._twist(WheelSpeeds(left, right))
-        limit = self.robot.max_turn_rate
-        speed = max(twist.linear, self.robot.min_speed)
-        return waiting(Twist(speed, min(max(twist.angular, -limit), limit)))
+        return waiting(clamp_twist(self.robot, twist.linear, twist.angular))
 
     def _from_twist(self, twist: Twist) -> FloatArray:
         half = 0.5 * twist.angular * self.robot.wheel_separation

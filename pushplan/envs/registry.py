@@ -31,6 +31,7 @@ ACTIONS: Mapping[str, str] = {
     "heading": "pushplan.envs.drive_actions:HeadingAction",
     "waypoint": "pushplan.envs.drive_actions:WaypointAction",
     "velocity": "pushplan.envs.action_modes:VelocityAction",
+    "omnidirectional": "pushplan.envs.action_modes:OmnidirectionalAction",
     "wheels": "pushplan.envs.action_modes:WheelsAction",
 }
 GYM_IDS: Mapping[str, str] = {

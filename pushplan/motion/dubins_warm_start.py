@@ -1,7 +1,8 @@
 """A warm start without a search: Dubins curves along the shortest path around the walls.
 
 The shortest path of a disc around the walls bends at a few places. The robot is sent along the
-tangents there, and from place to place on the shortest curve of bounded curvature (Dubins 1957).
+tangents there, and from place to place on the shortest curve of bounded curvature (Dubins 1957;
+Reeds and Shepp 1990 for cars that may reverse).
 """
 
 from __future__ import annotations
@@ -15,9 +16,12 @@ from pushplan.geometry import VisibilityGraph
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_improver import PathImprover
 from pushplan.motion.path_search_config import EDGE, INSET
+from pushplan.motion.speed_profile import TIGHTEST
 from pushplan.world import GoalDisc
 from pushplan.world.checks import FloatArray
 
+ARCS = 5
+"""Arcs of a shortest curve; those that it does not need have no length."""
 _FAR = 30.0
 """Edges of a tree in a straight line to the goal beyond which it is far."""
 _SHARP = 0.8
@@ -48,7 +52,9 @@ def along_guide(improver: PathImprover, *, around: bool = False) -> bool:
 
 def is_way(improver: PathImprover, vias: FloatArray) -> bool:
     """Return True if curves through vias (V, 3) are a path without a jam; the improver keeps it."""
-    return improver.drives(curves_through(vias, improver.lead.pose, improver.turning_radius))
+    if improver.world.robot.slides:
+        return improver.slides(vias[:, :2])
+    return improver.drives(curves_through(improver, vias, improver.lead.pose))
 
 
 def guides(improver: PathImprover, *, around: bool = False) -> Iterator[FloatArray]:
@@ -59,6 +65,8 @@ def guides(improver: PathImprover, *, around: bool = False) -> Iterator[FloatArr
     if isinstance(goal, GoalDisc):
         depth = goal.radius - 0.99 * float(improver.room.goal[3])
     radius = improver.turning_radius
+    if improver.world.robot.slides:
+        radius = TIGHTEST * size  # it may follow every corner
     wide = max(_WIDE * size, _BEYOND_RADIUS * radius)
     for clearance in (wide, _NARROW * size):
         if improver.stopped():
@@ -72,15 +80,17 @@ def guides(improver: PathImprover, *, around: bool = False) -> Iterator[FloatArr
             yield _vias(corners, radius, depth)
 
 
-def curves_through(vias: FloatArray, start: FloatArray, radius: float) -> FloatArray:
-    """(3 V, 2) lengths [m] and curvatures [1/m] of the shortest curves through vias (V, 3).
+def curves_through(improver: PathImprover, vias: FloatArray, start: FloatArray) -> FloatArray:
+    """(5 V, 2) lengths [m] and curvatures [1/m] of the shortest curves through vias (V, 3).
 
     They may touch walls and objects.
     """
-    arcs = np.empty((3 * len(vias), 2))
+    arcs = np.empty((ARCS * len(vias), 2))
+    radius = improver.turning_radius
+    reverses = improver.world.robot.curves_back
     here = start
     for i, there in enumerate(vias):
-        core.dubins(here, there, radius, arcs[3 * i : 3 * i + 3])
+        core.shortest_curve(here, there, radius, reverses, arcs[ARCS * i : ARCS * (i + 1)])
         here = there
     return arcs
 

@@ -12,7 +12,7 @@ import numpy as np
 from pushplan.core import motion as core
 from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.keep_out import keep_out
-from pushplan.world import Drive, GoalPose, RobotModel, World
+from pushplan.world import GoalPose, RobotModel, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import arc_lengths
 
@@ -35,7 +35,7 @@ class PathEnd(NamedTuple):
 
 def turns_at_end(robot: RobotModel) -> bool:
     """Return True if the robot turns to the heading of its goal on the spot, where it has room."""
-    return robot.drive is Drive.DIFFERENTIAL
+    return robot.turns_on_spot
 
 
 def path_end(
@@ -50,7 +50,8 @@ def path_end(
     """The shortest end of a path at a goal pose that touches nothing static.
 
     A differential drive goes to the goal and turns on the spot, the shorter way if it can; where
-    it has no room for that, and for other drives, a Dubins curve leads into the pose.
+    it has no room for that, and for other drives, a curve of Dubins leads into the pose, or one of
+    Reeds and Shepp where a car may reverse.
 
     Args:
         robot: says how it may turn.
@@ -71,7 +72,10 @@ def path_end(
     kinds = [True, False] if turns_at_end(robot) else [False]
     for on_spot, back in product(kinds, _BACK):
         places = np.unique(np.searchsorted(along, along[-1] - radius * np.array(back)))
-        curves = [(k, _curve(path[k], begin, radius, on_spot, near)) for k in places.tolist()]
+        back_too = robot.curves_back
+        curves = [
+            (k, _curve(path[k], begin, radius, on_spot, near, back_too)) for k in places.tolist()
+        ]
         curves.sort(key=lambda found: float(along[found[0]] + np.abs(found[1][:, 0]).sum()))
         for k, curve in curves:
             ways = _turned(goal, path[k], curve) if on_spot else iter([curve])
@@ -120,16 +124,16 @@ def behind(goal: GoalPose, length: float) -> FloatArray:
 
 
 def _curve(
-    start: FloatArray, end: FloatArray, radius: float, on_spot: bool, near: float
+    start: FloatArray, end: FloatArray, radius: float, on_spot: bool, near: float, reverses: bool
 ) -> FloatArray:
-    """(E, 2) Dubins arcs to a pose, or to its place for a turn: none where that is ``near`` [m]."""
+    """(E, 2) arcs to a pose, or to its place for a turn: none where that is ``near`` [m]."""
     dx, dy, _ = end - start
     if on_spot:
         if math.hypot(dx, dy) <= near:
             return np.empty((0, 2))
         end = np.array([end[0], end[1], math.atan2(dy, dx)])
-    arcs = np.empty((3, 2))
-    core.dubins(start, end, radius, arcs)
+    arcs = np.empty((5, 2))
+    core.shortest_curve(start, end, radius, reverses, arcs)
     return arcs
 
 

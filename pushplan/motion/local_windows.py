@@ -13,7 +13,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pushplan.geometry.obstacles import obstacles_of
-from pushplan.motion.dubins_warm_start import along_guide, curves_through, guides, is_far, is_way
+from pushplan.motion.dubins_warm_start import (
+    ARCS,
+    along_guide,
+    curves_through,
+    guides,
+    is_far,
+    is_way,
+)
 from pushplan.motion.path_improver import PathImprover
 from pushplan.motion.random_tree.tree_paths import TreePaths
 from pushplan.motion.swept_path import SweptPath, make_swept_path
@@ -127,9 +134,9 @@ class _GuidedDrive:
         """Go on through the vias."""
         end = self._path.poses[self._count - 1]
         begun = arc_lengths(self._path.poses[: self._count, :2])[-1]
-        arcs = curves_through(self._vias, end, self._improver.turning_radius)
+        arcs = curves_through(self._improver, self._vias, end)
         self._append(*self._improver.laid_out(arcs, end), 1)
-        self._bends = begun + np.cumsum(np.abs(arcs[:, 0]))[2::3]
+        self._bends = begun + np.cumsum(np.abs(arcs[:, 0]))[ARCS - 1 :: ARCS]
 
     def _first_fault(self) -> tuple[int, float]:
         """The first pose at which the robot touches a wall or jams, and the cost up to there.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
@@ -12,7 +13,7 @@ from pushplan.core import motion as core
 from pushplan.interaction import InteractionModel
 from pushplan.interaction.compiled_model import SweptModel, compile_interaction
 from pushplan.motion.collision import footprint, obstacles
-from pushplan.motion.goal_approach import behind, path_end, run_up, turns_at_end
+from pushplan.motion.goal_approach import behind, path_end, run_up
 from pushplan.motion.goal_region import goal_numbers
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_search_config import (
@@ -30,6 +31,7 @@ from pushplan.motion.time_slicing import Pace
 from pushplan.world import Drive, GoalDisc, GoalPose, PlanResult, PlanStatus
 from pushplan.world.checks import FloatArray
 from pushplan.world.planning_call import PlanningCall
+from pushplan.world.polyline import arc_lengths
 
 _THIN_MARGIN = 0.05
 """Margin below which a post could hide between two poses of the usual spacing [R]."""
@@ -39,6 +41,8 @@ _NO_MARGIN = 0.01  # a margin as small is given up then [R]
 _NEAR = 0.5
 """Radius of the disc at a goal pose to which searches lead [tolerance of the place], or at the
 beginning of a straight way into it [R]."""
+_SLOT = 2.5  # ways at both ends of a straight way on which a robot does not turn [R]
+_LONGEST_SLOT = 0.4  # the same of its length at most
 _BEYOND = 1e4  # times the way around the workspace with everything in tow: no path is as long
 ENDLESS = 2**62
 """A limit of the tests of a sweep that is none."""
@@ -117,7 +121,7 @@ class PathImprover:
         )
         self._goal_of_paths = self.room.goal
         if self.pose_goal is not None:
-            turns = turns_at_end(world.robot) and not self._straight
+            turns = world.robot.drive is Drive.DIFFERENTIAL and not self._straight
             self._goal_of_paths = np.append(self.room.goal[:4], self.pose_goal.heading)
             self._goal_of_paths[0] = 2.0 + turns
         # crowded worlds are slow to sweep: look at the stop rule more often
@@ -170,7 +174,7 @@ class PathImprover:
                 margin = 0.0
             self._set_margin(margin)
         radius = self.world.robot.turning_radius
-        if self.world.robot.drive is Drive.DIFFERENTIAL:
+        if self.world.robot.turns_on_spot:
             radius = 0.5 * self.turning_radius
         self.turning_radius = max(radius, TIGHTEST * self.size)
 
@@ -207,6 +211,8 @@ class PathImprover:
             footprint=room.footprint,
             walls=room.walls,
             price=self._price,
+            reverses=self.world.robot.curves_back,
+            slides=self.world.robot.slides,
         )
 
     @property
@@ -253,9 +259,38 @@ class PathImprover:
     def drives(self, arcs: FloatArray) -> bool:
         """Keep the path along some arcs where it touches no wall, jams nothing and arrives."""
         ended = self.ended(*self._along(arcs))
-        if ended is None:
+        return ended is not None and self._arrives(*ended)
+
+    def slides(self, places: FloatArray) -> bool:
+        """Keep the straight way from place to place (V, 2) likewise, turning at an even rate.
+
+        It ends at the goal pose where that is the goal, else at the heading that the robot has.
+        Where it touches a wall, the turn is made away from both ends, which may be in a slot.
+        """
+        start = self.world.robot_pose
+        corners = np.vstack([start[:2], places])
+        turn = 0.0
+        if self.pose_goal is not None:
+            corners[-1] = self.pose_goal.center
+            turn = self.pose_goal.heading_error(float(start[2]))
+        along = arc_lengths(corners)
+        count = math.ceil(along[-1] / self.room.spacing + abs(turn) / core.step_along(np.inf, 1.0))
+        if count == 0:
             return False
-        path, used = ended
+        length = float(along[-1])
+        for kept in (0.0, min(_SLOT * self.size, _LONGEST_SLOT * length)):
+            at = np.union1d(np.linspace(0.0, length, count + 1), [*along, kept, length - kept])
+            x, y = (np.interp(at, along, column) for column in corners.T)
+            turned = np.interp(at, [kept, length - kept], [0.0, turn])
+            path = make_swept_path(len(at), len(self.world.movables))
+            path.poses[:] = np.column_stack([x, y, start[2] + turned])
+            path.objects[0] = self.world.movables.poses
+            if self._arrives(path, len(at)):
+                return True
+        return False
+
+    def _arrives(self, path: SweptPath, used: int) -> bool:
+        """Keep a path if it is a plan."""
         goal = self.pose_goal or self.goal
         if self.first_blocked(path, used) < used or not goal.reached_by(path.poses[used - 1]):
             return False

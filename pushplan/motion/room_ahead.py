@@ -10,7 +10,7 @@ import numpy as np
 
 from pushplan.core import motion as core
 from pushplan.motion.time_slicing import never
-from pushplan.world import Drive, RobotModel
+from pushplan.world import RobotModel
 from pushplan.world.checks import FloatArray
 
 _STEP = 0.08  # length of a step [circumscribed radii]
@@ -117,7 +117,7 @@ def _moves(robot: RobotModel, step: float, radius: float) -> FloatArray:
     moves = _arcs(step * robot.circumscribed_radius, radius)
     if robot.min_speed < 0.0:
         moves = np.concatenate([moves * (-1.0, 1.0), moves])
-    if robot.drive is Drive.DIFFERENTIAL:
+    if robot.turns_on_spot:
         moves = np.concatenate([[(step, -math.inf), (step, math.inf)], moves])
     return moves
 

@@ -12,7 +12,6 @@ from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_improver import ENDLESS, Lead, PathImprover
 from pushplan.motion.room_ahead import way_to_turn
-from pushplan.world import Drive
 from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import arc_lengths
 
@@ -37,7 +36,7 @@ def start_turn(improver: PathImprover, before: Lead | None = None) -> Lead | Non
         The turn, after what comes before; None for other drives, and where a turn brings nothing.
     """
     world = improver.world
-    if world.robot.drive is not Drive.DIFFERENTIAL:
+    if not world.robot.turns_on_spot:
         return None
     if before is None:
         before = Lead(np.empty((0, 2)), world.robot_pose, world.movables.poses)

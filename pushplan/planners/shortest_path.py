@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+import copy
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pushplan.control import PurePursuit
 from pushplan.geometry import VisibilityGraph
+from pushplan.interaction import QuasiStatic
+from pushplan.motion.dubins_warm_start import along_guide
 from pushplan.motion.keep_out import keep_out
+from pushplan.motion.path_improver import PathImprover
+from pushplan.motion.path_search_config import PathSearchConfig
 from pushplan.motion.polyline_plan import polyline_result
-from pushplan.motion.speed_profile import start_margin
+from pushplan.motion.speed_profile import start_margin, turning_radius
+from pushplan.planners.following.plan_controller import PlanController
 from pushplan.planners.following.plan_follower import PlanFollower
-from pushplan.world import Planner, PlanResult, PlanStatus, Stop, World
+from pushplan.world import Drive, Movables, Planner, PlanResult, PlanStatus, Stop, World
 from pushplan.world.checks import number
 from pushplan.world.planning_call import PlanningCall
+
+_TRIES = 4
+"""Tries to lead a car along the path: the last ones turn as sharply as it can."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +32,8 @@ class ShortestPath:
 
     It is what a robot does that knows its map and not its surroundings, so every other planner is
     measured against it. The clearance is the circumscribed radius of the footprint, or, where the
-    goal cannot be reached with that, the inscribed one.
+    goal cannot be reached with that, the inscribed one. A car is led along it by the shortest
+    curves that it can drive, where those touch no wall.
 
     Args:
         spacing: distance between the poses of the plan, in circumscribed radii.
@@ -62,12 +71,38 @@ class ShortestPath:
             if late:
                 return call.result(call.stopped_status, iterations=looks)
             if np.isfinite(path.length):
-                return polyline_result(call, path.points, self.spacing, looks)
+                result = polyline_result(call, path.points, self.spacing, looks)
+                if (
+                    robot.drive is Drive.CAR or robot.slides
+                ) and result.status is not PlanStatus.SOLVED:
+                    return _in_curves(call, looks) or result
+                return result
         if start_margin(world, 0.0) is None:
             return call.result(PlanStatus.START_BLOCKED)
         return call.result(PlanStatus.GOAL_UNREACHABLE)
 
 
+def _in_curves(call: PlanningCall, looks: int) -> PlanResult | None:
+    """The path as a car or an omnidirectional robot can drive it; None where it hits a wall."""
+    alone = copy.copy(call)
+    alone.world = replace(call.world, movables=Movables.empty())
+    config = PathSearchConfig()
+    radius = turning_radius(alone.world.robot, config.turn_fraction)
+    improver = PathImprover(alone, config, QuasiStatic(), radius)
+    if improver.begin() is not None:
+        return None
+    for _ in range(_TRIES):
+        if along_guide(improver):
+            plan = improver.result(PlanStatus.SOLVED).plan
+            assert plan is not None
+            plan = replace(plan, object_poses=None)
+            return call.result(PlanStatus.SOLVED, plan, call.elapsed, looks)
+        improver.relax()
+    return None
+
+
 def straight(planner: Planner | None = None) -> PlanFollower:
     """Follows the shortest path around the walls through whatever is in the way."""
-    return PlanFollower(planner or ShortestPath(), PurePursuit())
+    return PlanFollower(
+        planner or ShortestPath(), PlanController(follows=(Drive.CAR, Drive.OMNIDIRECTIONAL))
+    )

@@ -104,7 +104,7 @@ class Messages:
         expect("twist", twist, Twist)
         return self.make(
             "geometry_msgs/Twist",
-            linear=self.vector(twist.linear, 0.0, 0.0),
+            linear=self.vector(twist.linear, twist.lateral, 0.0),
             angular=self.vector(0.0, 0.0, twist.angular),
         )
 

@@ -101,6 +101,7 @@ class DisturbedPolicy:
             world.robot,
             last.linear + part * (twist.linear - last.linear),
             last.angular + part * (twist.angular - last.angular),
+            last.lateral + part * (twist.lateral - last.lateral),
         )
         return self._applied
 

@@ -124,7 +124,9 @@ class Motors:
     def _toward(self, wanted: Twist) -> Twist:
         if not self._robot.can_stop:
             return wanted
-        return ramp_twist(self._robot, self.twist, wanted.linear, wanted.angular, self._period)
+        return ramp_twist(
+            self._robot, self.twist, wanted.linear, wanted.angular, self._period, wanted.lateral
+        )
 
     def _put(self, twist: Twist) -> None:
         self.twist = twist

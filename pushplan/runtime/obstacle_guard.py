@@ -88,7 +88,7 @@ class ObstacleGuard:
             held: time since the last command [s].
         """
         robot = world.robot
-        twist = ramp_twist(robot, before, wanted.linear, wanted.angular, held)
+        twist = ramp_twist(robot, before, wanted.linear, wanted.angular, held, wanted.lateral)
         near = self._near(world, twist)
         if not near:
             self._stands = False
@@ -98,7 +98,12 @@ class ObstacleGuard:
         closeness = _Closeness(footprint(robot, grown), world.robot_pose, near)
         for fraction in _SLOWER if robot.can_stop else (1.0,):
             slower = ramp_twist(
-                robot, before, fraction * wanted.linear, fraction * wanted.angular, held
+                robot,
+                before,
+                fraction * wanted.linear,
+                fraction * wanted.angular,
+                held,
+                fraction * wanted.lateral,
             )
             for side, path in self._paths(world, slower):
                 if closeness.allows(path):

@@ -451,7 +451,7 @@ class Runner:
             self._retry_at = now + _RETRY
             self._drop_plans()
             return None, CommandStatus.FAILED, self._failure
-        if wanted.linear == 0.0 == wanted.angular:
+        if wanted.linear == wanted.angular == wanted.lateral == 0.0:
             why = "a plan is on its way"
             if not self._running_s:
                 why = _missing_plan(self.policy) or "the policy asks for no motion"

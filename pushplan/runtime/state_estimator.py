@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pushplan.control.stopping import add_arc
+from pushplan.control.stopping import add_twist
 from pushplan.interaction.path_sweepers import default_interaction
 from pushplan.world import Goal, GoalPose, NavigationGoal, RobotModel, Twist, World
 from pushplan.world.checks import BoolArray, FloatArray
@@ -125,9 +125,10 @@ class StateEstimator:
         if len(path) == 1:
             return world.moved(time=time)
         twist = self._driven(time)
-        heading = float(path[-1, 2])
-        vx = twist.linear * math.cos(heading)
-        vy = twist.linear * math.sin(heading)
+        speed, bearing = twist.course
+        course = float(path[-1, 2]) + bearing
+        vx = speed * math.cos(course)
+        vy = speed * math.sin(course)
         return world.moved(
             robot_pose=path[-1],
             robot_twist=[vx, vy, twist.angular],
@@ -143,9 +144,7 @@ class StateEstimator:
         poses = [np.array(world.robot_pose)]
         for begin, end in itertools.pairwise(edges):
             twist = self._driven(0.5 * (begin + end))
-            length = twist.linear * (end - begin)
-            turn = twist.angular * (end - begin)
-            add_arc(poses, length, turn, size)
+            add_twist(poses, twist, end - begin, size)
         return np.array(poses)
 
     def _driven(self, time: float) -> Twist:
@@ -163,6 +162,7 @@ class StateEstimator:
         for (_, before), (at, after) in itertools.pairwise(self._sent):
             if world.time <= at < predicted.time:
                 speeds += (after.linear - before.linear) ** 2
+                speeds += (after.lateral - before.lateral) ** 2
                 rates += (after.angular - before.angular) ** 2
         place = drift + _RESPONSE**2 * speeds
         rim = drift + (_RESPONSE * size) ** 2 * rates

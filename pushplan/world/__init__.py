@@ -60,6 +60,7 @@ from pushplan.world.stored.robots import (
     box_delivery_robot,
     jackal,
     maze_robot,
+    racecar,
     turtlebot3_burger,
 )
 from pushplan.world.stored.world_files import load_world, save_world, world_from_dict, world_to_dict
@@ -126,6 +127,7 @@ __all__ = [
     "load_nav2_map",
     "load_world",
     "maze_robot",
+    "racecar",
     "save_world",
     "stream",
     "turtlebot3_burger",

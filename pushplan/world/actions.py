@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from pushplan.world.checked_fields import CheckedFields
@@ -15,12 +16,21 @@ class Twist(CheckedFields):
     Args:
         linear: forward speed [m/s].
         angular: turn rate, counter-clockwise positive [rad/s].
+        lateral: speed to the left [m/s]; 0 for all but omnidirectional drives.
     """
 
     field_prefix = "twist."
 
     linear: float
     angular: float
+    lateral: float = 0.0
+
+    @property
+    def course(self) -> tuple[float, float]:
+        """Speed [m/s], negative straight back, and its bearing in the body frame [rad]."""
+        if self.lateral == 0.0:
+            return self.linear, 0.0
+        return math.hypot(self.linear, self.lateral), math.atan2(self.lateral, self.linear)
 
 
 @dataclass(frozen=True)

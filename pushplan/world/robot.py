@@ -20,7 +20,15 @@ from pushplan.world.checked_fields import (
     PositiveFloat,
 )
 from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, choice, frozen, number
-from pushplan.world.outline import convex_outline, flatten, grown_outline, inscribed_radius
+from pushplan.world.outline import (
+    ConvexParts,
+    NotConvexError,
+    convex_outline,
+    flatten,
+    grown_outline,
+    inscribed_radius,
+    signed_area,
+)
 
 
 class Drive(enum.StrEnum):
@@ -30,6 +38,8 @@ class Drive(enum.StrEnum):
     """Always forward at ``max_speed``; only the turn rate is free (Maze robot, ship)."""
     DIFFERENTIAL = "differential"
     """Forward speed in [min_speed, max_speed] and turn rate are free; may turn on the spot."""
+    OMNIDIRECTIONAL = "omnidirectional"
+    """Velocity in any direction up to ``max_speed``, and turn rate, are free."""
     CAR = "car"
     """Forward speed in [min_speed, max_speed] is free; turns on ``min_turning_radius`` at best."""
 
@@ -42,13 +52,14 @@ class RobotModel(ArrayRecord, CheckedFields):
     """Footprint, mass and motion limits of a robot. Body frame: x forward, y left.
 
     Args:
-        parts: convex parts of the footprint as drawn, each (N, 2) corners in the body frame [m].
+        parts: parts of the footprint as drawn, each (N, 2) corners in the body frame [m]; concave
+            ones are kept as the convex parts of which they are the union.
         mass: mass as the metrics count it [kg].
         drive: how it may move.
         max_speed: greatest forward speed [m/s]; the speed itself for a constant-speed drive.
         max_turn_rate: greatest turn rate to either side [rad/s].
         min_speed: least forward speed [m/s], negative if it may reverse, else 0; a constant-speed
-            drive has none other than ``max_speed``.
+            drive has none other than ``max_speed``, an omnidirectional one its negative.
         max_acceleration: greatest change of the speed [m/s²]; infinite where speed can jump.
         max_turn_acceleration: greatest change of the turn rate [rad/s²].
         min_turning_radius: of a car, to the body origin, at any speed [m]; 0 for other drives.
@@ -60,7 +71,7 @@ class RobotModel(ArrayRecord, CheckedFields):
         name: for logs and pictures.
 
     Raises:
-        InvalidInputError: if a part is not convex or a limit has no sense.
+        InvalidInputError: if a part has no area or a limit has no sense.
     """
 
     field_prefix = "robot."
@@ -84,18 +95,21 @@ class RobotModel(ArrayRecord, CheckedFields):
             raise InvalidInputError("robot.parts must be a non-empty list of convex outlines")
         super().__post_init__()
         put = object.__setattr__
-        parts = [convex_outline(f"robot.parts[{i}]", p) for i, p in enumerate(self.parts)]
-        put(self, "parts", tuple(parts))
+        cut = [_convex_parts(f"robot.parts[{i}]", part) for i, part in enumerate(self.parts)]
+        put(self, "parts", tuple(part for pieces in cut for part in pieces))
         put(self, "drive", Drive(choice("drive", self.drive, [d.value for d in Drive])))
         if self.drive is Drive.CONSTANT_SPEED:
             put(self, "min_speed", self.max_speed)
+        elif self.drive is Drive.OMNIDIRECTIONAL:
+            put(self, "min_speed", -self.max_speed)
         else:  # it has to be able to stop
             number("robot.min_speed", self.min_speed, high=0.0)
-        if self.wheel_parts >= len(self.parts):
+        if self.wheel_parts >= len(cut):
             raise InvalidInputError(
-                f"robot.wheel_parts must be less than the number of parts, {len(self.parts)}, "
+                f"robot.wheel_parts must be less than the number of parts, {len(cut)}, "
                 f"got {self.wheel_parts}"
             )
+        put(self, "wheel_parts", sum(map(len, cut[len(cut) - self.wheel_parts :])))
         if (self.drive is Drive.CAR) != (self.min_turning_radius > 0.0):
             raise InvalidInputError(
                 "robot.min_turning_radius must be positive for a car and 0 for other drives, "
@@ -104,7 +118,7 @@ class RobotModel(ArrayRecord, CheckedFields):
 
     @classmethod
     def from_outline(cls, outline: ArrayLike, **limits: object) -> RobotModel:
-        """A robot whose footprint is one convex outline (N, 2) [m]; the rest as in the class."""
+        """A robot whose footprint is one outline (N, 2) [m]; the rest as in the class."""
         return cls(parts=(outline,), **limits)  # type: ignore[arg-type]
 
     def inflated(self, margin: float) -> RobotModel:
@@ -163,6 +177,32 @@ class RobotModel(ArrayRecord, CheckedFields):
         return self.min_turning_radius or self.max_speed / self.max_turn_rate
 
     @property
+    def slides(self) -> bool:
+        """True if the robot moves in any direction, whatever its heading."""
+        return self.drive is Drive.OMNIDIRECTIONAL
+
+    @property
+    def curves_back(self) -> bool:
+        """True for a car that may reverse: its shortest curves lead ahead and back."""
+        return self.drive is Drive.CAR and self.min_speed < 0.0
+
+    @property
+    def turns_on_spot(self) -> bool:
+        """True if the robot may turn without driving."""
+        return self.drive in (Drive.DIFFERENTIAL, Drive.OMNIDIRECTIONAL)
+
+    @property
     def can_stop(self) -> bool:
         """True if the robot may stand."""
         return self.drive is not Drive.CONSTANT_SPEED
+
+
+def _convex_parts(name: str, outline: ArrayLike) -> ConvexParts:
+    """The convex parts of an outline, concave or not; the largest first, as it may be a chassis."""
+    try:
+        return (convex_outline(name, outline),)
+    except NotConvexError:
+        from pushplan.world.outline_repair import cut_outlines  # loads Shapely
+
+        pieces = cut_outlines(name, [outline], lambda _: name)[0]
+        return tuple(sorted(pieces, key=signed_area, reverse=True))

@@ -58,6 +58,8 @@ def _check_motion(world: World, plan: Plan, rounding: float) -> None:
         slack = 1e-6 * np.abs(values).max() + 1e-12
         if np.isfinite(acceleration) and (robot.can_stop or values is plan.turn_rates):
             assert np.all(changes <= acceleration * between * (1.0 + 1e-6) + slack), "acceleration"
+    if robot.slides:
+        return
     far = lengths > 1e-3 * size + 1e3 * rounding
     ahead = np.arctan2(moved[far, 1], moved[far, 0]) - plan.poses[:-1][far, 2]
     aside = np.sin(ahead - 0.5 * moved[far, 2])

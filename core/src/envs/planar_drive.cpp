@@ -39,7 +39,7 @@ bool PlanarDrive::try_run(const DriveStep& step, std::span<const Index> active,
     double advancing = chord;  // a robot that is held tries again after the next sample
     for (Index j = 0; j < step.each; ++j) {
       const bool is_first = i == 0 && j == 0;
-      const double middle = step.holds ? step.course : heading + half;
+      const double middle = step.holds ? step.course : heading + half + step.bearing;
       const Twist robot{advancing * std::cos(middle), advancing * std::sin(middle), w};
       if (!is_first && !careful && !scene_.touches_static()) {  // a jam needs something static
         scene_.advance(robot, h);

@@ -33,9 +33,18 @@ PlanarSimulator::PlanarSimulator(const Chipmunk& engine, const ChipmunkHandles& 
       loaded_(std::make_unique<bool[]>(poses_.size())),
       missed_(std::make_unique<bool[]>(poses_.size())) {}
 
-void PlanarSimulator::step(double linear, double angular, double duration) {
+/// Motion at a velocity ahead and to the left; one to the side is one ahead of another bearing.
+ArcMotion PlanarSimulator::motion_of(double linear, double angular, double lateral) const {
+  const double theta = states_[0].pose.theta;
+  if (lateral == 0.0) return {theta, linear, angular, settings_.holds};
+  const double bearing = std::atan2(lateral, linear);
+  return {theta + bearing, std::hypot(linear, lateral), angular, settings_.holds, bearing};
+}
+
+void PlanarSimulator::step(double ahead, double angular, double lateral, double duration) {
   start_record();
-  const ArcMotion motion{states_[0].pose.theta, linear, angular, settings_.holds};
+  const ArcMotion motion = motion_of(ahead, angular, lateral);
+  const double linear = motion.linear;
   const double clear = clear_time(motion, duration);
   const double turn = std::abs(angular) * duration;
   if (clear >= duration) {
@@ -65,7 +74,8 @@ void PlanarSimulator::step(double linear, double angular, double duration) {
   const Index left = samples - free;
   const double rest = duration * static_cast<double>(left) / count;
   choose(speed * rest, duration);
-  const DriveStep drive{linear, angular, rest, motion.course, motion.holds, left, each};
+  const DriveStep drive{linear,         angular,      rest, motion.course,
+                        motion.bearing, motion.holds, left, each};
   simulate(left, [&] { drive_.run(drive, active_, start_, driven_); });
 }
 
@@ -87,8 +97,8 @@ bool PlanarSimulator::sweep(const Pose& to, const Pose& motion, double length, d
   return !record_.held;
 }
 
-double PlanarSimulator::clear_for(double linear, double angular, double limit) {
-  return clear_time({states_[0].pose.theta, linear, angular, settings_.holds}, limit);
+double PlanarSimulator::clear_for(double linear, double angular, double lateral, double limit) {
+  return clear_time(motion_of(linear, angular, lateral), limit);
 }
 
 /// Also takes the poses and speeds of the objects.
@@ -133,7 +143,8 @@ void PlanarSimulator::glide(const ArcMotion& motion, double duration, Index samp
   stop_objects();
   const Pose end = record_.robot.back();
   const double v = motion.linear;
-  states_[0] = {end, {v * std::cos(end.theta), v * std::sin(end.theta), motion.angular}};
+  const double course = end.theta + motion.bearing;
+  states_[0] = {end, {v * std::cos(course), v * std::sin(course), motion.angular}};
 }
 
 /// Marks the objects to be loaded where points of the robot move by `reach` [m].

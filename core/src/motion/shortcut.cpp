@@ -19,6 +19,22 @@ Index lay_dubins(const Pose& start, const Pose& end, const DubinsLimits& limits,
   return sample_arcs(start, path.arcs, limits.spacing, out);
 }
 
+Index lay_straight(const Pose& start, const Pose& end, double spacing, const PathBuffer& out) {
+  const double dx = end.x - start.x;
+  const double dy = end.y - start.y;
+  const double turn = wrap_below_pi(end.theta - start.theta);
+  const double steps =
+      std::ceil(std::max(std::sqrt(dx * dx + dy * dy) / spacing, std::abs(turn) / kMaxTurn));
+  if (!(steps <= static_cast<double>(out.size()))) return -1;
+  for (Index i = 0; i < static_cast<Index>(steps); ++i) {
+    const double part = static_cast<double>(i + 1) / steps;
+    out.poses[static_cast<std::size_t>(i)] = {start.x + part * dx, start.y + part * dy,
+                                              start.theta + part * turn};
+    out.curvatures[static_cast<std::size_t>(i)] = 0.0;
+  }
+  return static_cast<Index>(steps);
+}
+
 Index copy_rest(const Path& path, Index last, const PathBuffer& out, Index size) {
   constexpr double kTurn = 2.0 * std::numbers::pi;
   const Index rest = path.size() - 1 - last;

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "pushplan/motion/reeds_shepp.hpp"
 #include "pushplan/motion/shortcut.hpp"
 
 namespace pushplan {
@@ -35,6 +36,10 @@ Pose new_end(const Pose& from, const Pose& last, const ShortcutShift& shift,
     end.x = last.x - behind * goal.normal.x - aside * goal.normal.y;
     end.y = last.y - behind * goal.normal.y + aside * goal.normal.x;
   }
+  if (problem.connection == Connection::kStraight) {
+    end.theta = last.theta;
+    return end;
+  }
   // heading at the end of the turn-then-straight path: nearly the bearing from here
   end.theta = std::atan2(end.y - from.y, end.x - from.x) + 0.1 * shift.turn;
   const double turn = wrap_below_pi(end.theta - from.theta);
@@ -46,6 +51,18 @@ Pose new_end(const Pose& from, const Pose& last, const ShortcutShift& shift,
       problem.turning_radius * (1.0 - std::cos(turn)) / std::max(gap, problem.turning_radius);
   end.theta += sign(turn) * std::min(shifted, kMostShift);
   return end;
+}
+
+/// Lays the shortest motion between two poses, without the start. Returns the number of poses, -1
+/// where it does not fit.
+Index connect(const Pose& start, const Pose& end, const PathProblem& problem,
+              const PathBuffer& out) {
+  if (problem.connection == Connection::kStraight) {
+    return lay_straight(start, end, problem.spacing, out);
+  }
+  const bool reverses = problem.connection == Connection::kReedsShepp;
+  const ShortestCurve way = shortest_curve(start, end, problem.turning_radius, reverses);
+  return sample_arcs(start, way.arcs, problem.spacing, out);
 }
 
 /// First and last pose of the piece to replace: short pieces as often as long ones.
@@ -81,8 +98,7 @@ ShortcutProposal propose_shortcut(const SweptPath& path, Index count, const Shor
   Index size = copy_start(old, first, out);
   const auto drive_to = [&](const Pose& stop) {
     const Pose here = out.poses[at(size - 1)];
-    const DubinsPath way = dubins(here, stop, problem.turning_radius);
-    const Index added = sample_arcs(here, way.arcs, problem.spacing, out.from(size));
+    const Index added = connect(here, stop, problem, out.from(size));
     if (added >= 0) size += added;
     return added >= 0;
   };

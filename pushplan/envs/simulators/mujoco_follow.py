@@ -79,7 +79,14 @@ def _drive_leg(
         late = math.hypot(ahead, left) > _LATE * robot.circumscribed_radius
         late |= abs(turned) > _LATE
         part = period if late else min(period, duration - done)
-        simulator.step(_command(robot, (ahead, left, turned), speed, rate), part)
+        if robot.slides:
+            pace = 2.0 * robot.max_speed / robot.circumscribed_radius
+            vx = dx / duration + pace * ex
+            vy = dy / duration + pace * ey
+            command = Twist(c * vx + s * vy, rate + 2.0 * pace * turned, c * vy - s * vx)
+        else:
+            command = _command(robot, (ahead, left, turned), speed, rate)
+        simulator.step(command, part)
         if late:
             waited += part
             if waited > patience:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -162,9 +163,34 @@ def _wheels(robot: RobotModel, solids: Solids, options: MujocoOptions) -> str:
         across=wheel_mass * (3.0 * radius**2 + width**2) / 12.0,
         along=0.5 * wheel_mass * radius**2,
         rotor=rotor,
-        gain=(0.5 * mass * radius**2 + rotor) / options.motor_time,
-        torque=0.5 * options.motor_force * mass * GRAVITY * radius,
+        wheel="caster" if robot.slides else "wheel",
+        site='<site name="thrusters"/>' if robot.slides else "",
+        motors="".join(_motors(robot, rotor, radius, options)),
     )
+
+
+def _motors(
+    robot: RobotModel, rotor: float, radius: float, options: MujocoOptions
+) -> Iterator[str]:
+    """The actuators of the wheels, or of an omnidirectional robot's body: ahead, left, turning."""
+    mass = robot.mass
+    force = options.motor_force * mass * GRAVITY
+    if not robot.slides:
+        gain = (0.5 * mass * radius**2 + rotor) / options.motor_time
+        torque = 0.5 * force * radius
+        for side in ("left", "right"):
+            name = f"{side} wheel"
+            yield _motor(name, f'joint="{name}"', gain, torque)
+        return
+    lever = robot.circumscribed_radius
+    for name, axis, scale in (("ahead", 0, 1.0), ("aside", 1, 1.0), ("turn", 5, lever)):
+        gear = " ".join("1" if i == axis else "0" for i in range(6))
+        gain = mass * scale**2 / options.motor_time
+        yield _motor(name, f'site="thrusters" gear="{gear}"', gain, force * scale)
+
+
+def _motor(name: str, where: str, gain: float, most: float) -> str:
+    return f'  <velocity name="{name}" {where} kv="{gain}" forcerange="-{most} {most}"/>\n'
 
 
 def _thrusters(robot: RobotModel, options: MujocoOptions) -> str:

@@ -101,8 +101,8 @@ class MujocoSimulator(Simulator):
             (samples, nq) positions after each interval [s], and whether the hull touched anything.
         """
         bodies = self._scene
-        if bodies.afloat:
-            bodies.ctrl[:] = command.linear, 0.0, command.angular
+        if bodies.afloat or self._world.robot.slides:
+            bodies.ctrl[:] = command.linear, command.lateral, command.angular
         else:
             bodies.ctrl[:] = bodies.wheel_speeds(command.linear, command.angular)
         stored = np.empty((self.options.samples, bodies.model.nq))
@@ -127,13 +127,15 @@ class MujocoSimulator(Simulator):
         gains = self._scene.accelerations
         middle = len(poses) // 2
         halves = (poses[: middle + 1], poses[middle:])
-        asked = command.linear, command.angular
+        speed, bearing = command.course
+        asked = speed, command.angular
         for i, limit in enumerate((robot.max_speed, robot.max_turn_rate)):
             wanted = abs(asked[i])
             if wanted < _NEGLIGIBLE * limit or not 0 < middle < len(poses) - 1:
                 continue
             first, second = (
-                math.copysign(1.0, asked[i]) * _rates(half)[i] / interval for half in halves
+                math.copysign(1.0, asked[i]) * _rates(half, bearing)[i] / interval
+                for half in halves
             )
             possible = min(gains[i] * middle * interval, wanted - first)
             if second < HELD_SHARE * wanted and second - first <= GAIN_SHARE * possible:
@@ -197,12 +199,12 @@ class MujocoSimulator(Simulator):
         return self._camera.take(self._scene.qpos, self.world())
 
 
-def _rates(poses: FloatArray) -> tuple[float, float]:
-    """Mean way along the heading [m] and turn [rad] from one of (N, 3) poses to the next."""
+def _rates(poses: FloatArray, bearing: float) -> tuple[float, float]:
+    """Mean way at a bearing [m] and turn [rad] from one of (N, 3) poses to the next."""
     first = poses[0]
     last = poses[-1]
     count = max(len(poses) - 1, 1)
     turn = math.remainder(float(last[2] - first[2]), math.tau)
-    middle = float(first[2]) + 0.5 * turn
+    middle = float(first[2]) + 0.5 * turn + bearing
     way = (last[0] - first[0]) * math.cos(middle) + (last[1] - first[1]) * math.sin(middle)
     return float(way) / count, turn / count

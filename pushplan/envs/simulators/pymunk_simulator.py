@@ -110,7 +110,8 @@ class PymunkSimulator(Simulator):
     def step(self, command: Twist, duration: float) -> Trace:
         """Drive at a body-frame velocity for ``duration`` [s]."""
         duration = number("duration", duration, low=0.0, open_low=True)
-        robot, paths, held, touched = self._core.step(command.linear, command.angular, duration)
+        velocity = command.linear, command.angular, command.lateral
+        robot, paths, held, touched = self._core.step(*velocity, duration)
         self._held = held
         self._touched = touched
         times = self._time + duration * np.arange(1, len(robot) + 1) / len(robot)
@@ -120,7 +121,7 @@ class PymunkSimulator(Simulator):
 
     def clear_for(self, command: Twist, limit: float) -> float:
         """Return a time in which the robot certainly touches nothing, as `Simulator.clear_for`."""
-        return self._core.clear_for(command.linear, command.angular, limit)
+        return self._core.clear_for(command.linear, command.angular, command.lateral, limit)
 
     def follow(self, path: ArrayLike) -> Interaction:
         """Sweep the robot straight from pose to pose at its full speed."""

@@ -299,4 +299,6 @@ def drive_of(action: str) -> Drive:
     """Return the drive of a robot that is commanded by an action mode."""
     if action == "turn_rate":
         return Drive.CONSTANT_SPEED
+    if action == "omnidirectional":
+        return Drive.OMNIDIRECTIONAL
     return Drive.DIFFERENTIAL

@@ -83,7 +83,7 @@ class MazeTask(Task):
     name = "maze"
     presets = tuple(PRESETS)
     solid_presets = ("testbed",)
-    actions: ClassVar[tuple[str, ...]] = ("turn_rate", "wheels", "velocity")
+    actions: ClassVar[tuple[str, ...]] = ("turn_rate", "wheels", "velocity", "omnidirectional")
     observations: ClassVar[tuple[str, ...]] = ("image", "state")
 
     preset_table = PRESETS

@@ -18,6 +18,7 @@ from pushplan.envs.tasks.variations import TaskVariations
 from pushplan.geometry.distance_field import geodesic_field
 from pushplan.observation import ImageObservation
 from pushplan.world import (
+    Drive,
     InvalidInputError,
     Receptacle,
     ScenarioError,
@@ -89,7 +90,7 @@ class RoomTask(Task):
     name = "room"
     presets = tuple(PRESETS)
     solid_presets = ("testbed",)
-    actions: ClassVar[tuple[str, ...]] = ("velocity", "wheels")
+    actions: ClassVar[tuple[str, ...]] = ("velocity", "wheels", "omnidirectional")
     observations: ClassVar[tuple[str, ...]] = ("image", "state")
 
     image_channels: tuple[str, ...] = ("footprint", "movable", "static", "goal_distance")
@@ -103,7 +104,11 @@ class RoomTask(Task):
         path = self.variations.world_file
         try:
             world = load_world(SMALL_ROOM if path is None else path)
-            self._drive(world.robot)
+            robot = world.robot
+            if self.action == "omnidirectional":
+                drive = Drive.OMNIDIRECTIONAL
+                robot = replace(robot, drive=drive, min_turning_radius=0.0)
+            self._drive(robot)
             robot = self.robot
             if self.action == "wheels" and robot.wheel_separation == 0.0:
                 raise InvalidInputError(f"robot {robot.name!r} has no wheels (valid: velocity)")

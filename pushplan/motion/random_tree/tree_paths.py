@@ -82,7 +82,7 @@ class TreePaths:
             improver.backward = max(2.0 * improver.backward, _BACKWARD * robot.turning_radius)
         elif robot.min_speed < 0.0 and not self._gets_away():
             improver.begin_with(drive_to_turn(improver) or improver.lead)
-        if not improver.relaxed:
+        if not improver.relaxed and not robot.slides:
             tightest = max(robot.turning_radius, TIGHTEST * improver.size)
             bare = improver.room._replace(footprint=footprint(robot))
             pose = improver.world.robot_pose

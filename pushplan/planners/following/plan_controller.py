@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from pushplan.control import PathFollower, PurePursuit
 from pushplan.geometry.angles import wrap_angle
-from pushplan.world import Controller, Plan, Twist, World
+from pushplan.world import Controller, Drive, Plan, Twist, World
 
 _OFF = 0.05
 """Turn from pose to pose [rad] that the turn rates of a trajectory may leave unexplained."""
 
 
 class PlanController:
-    """`PathFollower` for trajectories, pure pursuit for paths without turn rates."""
+    """`PathFollower` for trajectories, pure pursuit for paths without turn rates.
 
-    def __init__(self) -> None:
+    Args:
+        follows: drives whose trajectories are followed; the plans of others are pursued too.
+    """
+
+    def __init__(self, follows: Collection[Drive] = tuple(Drive)) -> None:
+        self._follows = follows
         self._follower = PathFollower()
         self._pursuit = PurePursuit()
         self._plan: Plan | None = None
@@ -30,7 +37,8 @@ class PlanController:
     def command(self, world: World, plan: Plan) -> Twist:
         """See `pushplan.world.Controller`."""
         if plan is not self._plan:
-            chosen = self._follower if is_trajectory(plan) else self._pursuit
+            follows = world.robot.drive in self._follows and is_trajectory(plan)
+            chosen = self._follower if follows else self._pursuit
             if chosen is not self._chosen:
                 chosen.reset(world)
             self._plan = plan

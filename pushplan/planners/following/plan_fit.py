@@ -149,6 +149,6 @@ def reaction_length(world: World, latency: float) -> float:
         latency: time that the planning call takes [s].
     """
     robot = world.robot
-    speed = abs(driven_twist(world).linear)
+    speed = abs(driven_twist(world).course[0])
     braking = 0.5 * speed * speed / robot.max_acceleration
     return latency * speed + braking + robot.circumscribed_radius

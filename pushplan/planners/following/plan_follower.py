@@ -69,7 +69,7 @@ class PlanFollower:
         stop: stop rule of each planning call; the planner's own default if None.
     """
 
-    actions = ("turn_rate", "velocity")
+    actions: tuple[str, ...] = ("turn_rate", "velocity", "omnidirectional")
     goal_kind = "robot"
 
     def __init__(
@@ -149,7 +149,7 @@ class PlanFollower:
         wanted = self._choose(world)
         last = self._clock.command
         held = self._clock.held
-        return ramp_twist(world.robot, last, wanted.linear, wanted.angular, held)
+        return ramp_twist(world.robot, last, wanted.linear, wanted.angular, held, wanted.lateral)
 
     def _choose(self, world: World) -> Twist:
         away = self._recover(world) if self._recovery.is_on else None

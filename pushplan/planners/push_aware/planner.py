@@ -11,7 +11,7 @@ from pushplan.motion.path_improver import PathImprover
 from pushplan.motion.speed_profile import turning_radius
 from pushplan.planners.push_aware.planning_call import PushAwareSearch
 from pushplan.planners.push_aware.push_aware_config import PushAwareConfig
-from pushplan.world import Drive, PlanResult, RobotModel, Stop, World
+from pushplan.world import PlanResult, RobotModel, Stop, World
 from pushplan.world.checks import expect
 from pushplan.world.planning_call import PlanningCall
 from pushplan.world.stop import DefaultBudget
@@ -89,7 +89,7 @@ class PushAware:
 
 def _least_radius(robot: RobotModel, config: PushAwareConfig) -> float:
     """Least turning radius of plans [m], as long as there is a way with it."""
-    if robot.drive is Drive.DIFFERENTIAL:
+    if robot.turns_on_spot:
         return config.differential_radius * robot.circumscribed_radius
     return turning_radius(robot, config.turn_fraction)
 

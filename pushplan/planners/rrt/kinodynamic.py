@@ -13,7 +13,7 @@ from pushplan.motion.path_improver import Candidate, PathImprover
 from pushplan.motion.path_search_config import PathSearchConfig
 from pushplan.motion.random_tree.tree_paths import TreePaths
 from pushplan.motion.speed_profile import turning_radius
-from pushplan.world import PlanResult, PlanStatus, Stop, World
+from pushplan.world import Drive, PlanResult, PlanStatus, Stop, World
 from pushplan.world.checks import expect
 from pushplan.world.planning_call import PlanningCall
 from pushplan.world.stop import DefaultBudget
@@ -68,7 +68,9 @@ class KinodynamicRRT:
         status = improver.begin()
         if status is None:
             trees.look_ahead()
-            if is_far(improver) or len(improver.lead.pieces):
+            robot = improver.world.robot
+            parks = improver.pose_goal is not None and robot.drive is Drive.CAR
+            if parks or robot.slides or is_far(improver) or len(improver.lead.pieces):
                 warm_start(improver)
             status = _search(improver, trees) or call.stopped_status
         return improver.result(status, trees=float(trees.trees))

@@ -1,4 +1,4 @@
-"""A catalogue of robots: the TurtleBot3 Burger with its bumpers, the Jackal, the 2D benchmark's.
+"""A catalogue of robots: TurtleBot3 Burger with bumpers, Jackal, a car, the 2D benchmark's.
 
 All of them take how the robot may move (``drive``) and, as ``limits``, anything else that
 `RobotModel` takes, such as ``max_speed`` [m/s]; some take a ``bumper``, one of `BUMPERS`. An
@@ -31,6 +31,7 @@ CONTACT_RADIUS = 0.02
 ROBOTS = (
     "turtlebot3_burger",
     "jackal",
+    "racecar",
     "maze_robot",
     "box_delivery_robot",
     "area_clearing_robot",
@@ -66,6 +67,15 @@ def jackal(
     Bumpers have the Burger's shapes at 0.46 m width.
     """
     return _robot("jackal", drive, limits, bumper)
+
+
+def racecar(drive: Drive | str = Drive.CAR, **limits: float) -> RobotModel:
+    """A car of scale 1/10: 0.44 x 0.285 m, 3.5 kg, origin midway between the rear wheels.
+
+    0.36 m/s ahead and back; with a wheelbase of 0.29 m and 0.28 rad of steering it turns on 1.009 m
+    at best. With ``min_speed=0`` it does not reverse.
+    """
+    return _robot("racecar", drive, limits)
 
 
 def maze_robot(drive: Drive | str = Drive.CONSTANT_SPEED, **limits: float) -> RobotModel:
@@ -144,6 +154,8 @@ def _robot(
             raise UnknownNameError("limit of a robot", key, _LIMITS)
     own = {"bumpers": {"none": []}, **_catalogue()[name]}
     parts = (*own.pop("parts"), *own.pop("bumpers")[bumper])
+    if drive != Drive.CAR:
+        own.pop("min_turning_radius", None)
     robot = RobotModel(parts, **{**own, **limits, "drive": drive, "name": name})
     if robot.drive is Drive.DIFFERENTIAL and "min_speed" not in limits:
         robot = replace(robot, min_speed=-robot.max_speed)  # reverses as fast

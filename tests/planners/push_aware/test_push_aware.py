@@ -168,11 +168,12 @@ def test_the_turning_bound_is_below_every_dubins_path(x, y, theta, radius, size)
     goal, pose = GoalDisc([x, y], size), np.array([0.0, 0.0, theta])
     bound = turning_length(pose, goal, radius)
     assert bound >= goal.distance(0.0, 0.0) - 1e-3 * (goal.distance(0.0, 0.0) + size)
-    pieces, shortest = np.empty((3, 2)), np.inf
+    pieces, shortest = np.empty((5, 2)), np.inf
     for around in np.linspace(0.0, 2.0 * np.pi, 13):
         for heading in np.linspace(-np.pi, np.pi, 13):
             end = [x + 0.999 * size * np.cos(around), y + 0.999 * size * np.sin(around), heading]
-            shortest = min(shortest, motion.dubins(pose, np.array(end), radius, pieces))
+            length = motion.shortest_curve(pose, np.array(end), radius, False, pieces)
+            shortest = min(shortest, length)
     if goal.distance(0.0, 0.0) > 0.0:
         assert bound <= shortest + 1e-9
 

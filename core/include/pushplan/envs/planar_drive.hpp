@@ -10,10 +10,11 @@ namespace pushplan {
 
 /// One step of the robot, in equal substeps.
 struct DriveStep {
-  double linear;    // velocity in the body frame [m/s]
+  double linear;    // speed at the bearing [m/s]
   double angular;   // [rad/s]
   double duration;  // [s]
   double course;    // direction in the world that it keeps while it turns [rad]
+  double bearing;   // of its motion in the body frame, 0 ahead [rad]
   bool holds;       // true if it keeps it; else it drives an arc
   Index samples;    // states that are recorded
   Index each;       // substeps between two of them

@@ -36,15 +36,15 @@ class PlanarSimulator {
                   const PlanarSettings& settings,
                   std::span<BodyState> states);  // (1 + K,) the robot, then each object
 
-  /// Drives at a velocity in the body frame for `duration` [s].
-  void step(double linear, double angular, double duration);
+  /// Drives at a velocity ahead, a turn rate and a velocity to the left for `duration` [s].
+  void step(double linear, double angular, double lateral, double duration);
 
   /// Drives straight at constant speed. Returns false if the robot was held.
   bool sweep(const Pose& to, const Pose& motion,  // difference to the pose now
              double length, double duration);
 
   /// Time [s], at most `limit`, in which the robot certainly touches nothing at this velocity.
-  double clear_for(double linear, double angular, double limit);
+  double clear_for(double linear, double angular, double lateral, double limit);
 
   /// What happened in the last step or sweep.
   const PlanarRecord& record() const { return record_; }
@@ -62,6 +62,7 @@ class PlanarSimulator {
   template <class Run>
   void simulate(Index samples, Run run);
   void glide(const ArcMotion& motion, double duration, Index samples);
+  ArcMotion motion_of(double linear, double angular, double lateral) const;
   void start_record();
   void stop_objects();
   void look_at_objects();

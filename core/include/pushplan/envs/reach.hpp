@@ -17,10 +17,11 @@ struct ReachShapes {
 
 /// How a robot drives from where it is.
 struct ArcMotion {
-  double course;   // in which direction of the world it begins to go [rad]
-  double linear;   // its speed in this direction [m/s]
-  double angular;  // its turn rate [rad/s]
-  bool holds;      // true if it keeps its course; else this turns with it
+  double course;         // in which direction of the world it begins to go [rad]
+  double linear;         // its speed in this direction [m/s]
+  double angular;        // its turn rate [rad/s]
+  bool holds;            // true if it keeps its course; else this turns with it
+  double bearing = 0.0;  // of its motion in the body frame, 0 ahead [rad]
 };
 
 /// The pose after some time [s].

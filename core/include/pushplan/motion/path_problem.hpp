@@ -32,6 +32,13 @@ struct PriceGrid {
   }
 };
 
+/// The motion by which shortcuts lead from pose to pose.
+enum class Connection {
+  kDubins,      // arcs ahead
+  kReedsShepp,  // arcs ahead and back
+  kStraight     // straight in any direction, turning at an even rate
+};
+
 /// Costs and constraints of a path.
 struct PathProblem {
   double robot_mass;      // m0 [kg]
@@ -44,6 +51,7 @@ struct PathProblem {
   GoalRegion goal;
   Footprint footprint;  // with its margin
   ConvexObstacles walls;
+  Connection connection = Connection::kDubins;
   PriceGrid price{};
 };
 

@@ -25,6 +25,10 @@ Index copy_start(const Path& path, Index last, const PathBuffer& out);
 Index lay_dubins(const Pose& start, const Pose& end, const DubinsLimits& limits,
                  const PathBuffer& out);
 
+/// Lays poses straight from one to another, turning the shorter way at an even rate, without the
+/// start. Returns the number of poses, -1 where they do not fit.
+Index lay_straight(const Pose& start, const Pose& end, double spacing, const PathBuffer& out);
+
 /// Copies a path after its pose `last`, at which a new piece ends that fills the first `size` poses
 /// of `out`. Returns the new size.
 Index copy_rest(const Path& path, Index last, const PathBuffer& out, Index size);

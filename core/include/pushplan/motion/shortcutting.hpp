@@ -1,6 +1,7 @@
-// Shortcutting of drivable paths at random with Dubins curves.
+// Shortcutting of drivable paths at random with Dubins curves, or
+// with those of Reeds and Shepp where the robot may reverse.
 //
-// A piece of the path is replaced by a Dubins path, straight across, through a displaced pose, or
+// A piece of the path is replaced by such a curve, straight across, through a displaced pose, or
 // to another end in the goal; the objects are swept along with the candidate from the piece on, and
 // it is kept when m0 l0 + w sum(mi li) falls. Shortcutting is Geraerts and Overmars (2007); what is
 // added is that the cost of every candidate holds the interaction that it would cause.
