@@ -196,8 +196,8 @@ def _free_start(
         *(shapely.Polygon(part) for k in range(len(movables)) for part in movables.parts_world(k)),
     ]
     tree: Any = shapely.STRtree(taken)
-    low, high = static.bounds[:2], static.bounds[2:]
-    for pose in rng.uniform((*low, -np.pi), (*high, np.pi), (_DRAWS, 3)):
+    x0, y0, x1, y1 = static.bounds.tolist()
+    for pose in rng.uniform((x0, y0, -np.pi), (x1, y1, np.pi), (_DRAWS, 3)):
         parts = [shapely.Polygon(transform(pose, part)) for part in robot.contact_parts]
         if not len(tree.query(parts, "dwithin", _GAP)[0]):
             return np.asarray(pose)

@@ -68,7 +68,9 @@ class RearrangeTask(RoomTask):
         wanted = self.variations
         self._side = wanted.room or self.preset.room
         self.state_objects = max(self.state_objects, wanted.objects + wanted.obstacles)
-        room = RELOPUSH_ROOM if wanted.instances is not None else (self._side, self._side)
+        room = (self._side, self._side)
+        if wanted.instances is not None:
+            room = RELOPUSH_ROOM
         self.reach = 2.0 * math.hypot(*room)
 
     def start(self, rng: np.random.Generator) -> World:

@@ -126,8 +126,10 @@ def _goal_to_dict(goal: Goal) -> dict[str, Any]:
     if isinstance(goal, ObjectGoals):
         columns = [_plain(getattr(goal, name)) for name in _PLACE.values()]
         places = [dict(zip(_PLACE, row, strict=True)) for row in zip(*columns, strict=True)]
-        robot = {} if goal.robot is None else {"robot": _goal_to_dict(goal.robot)}
-        return {"kind": _OBJECTS, "places": places, **robot}
+        written: dict[str, Any] = {"kind": _OBJECTS, "places": places}
+        if goal.robot is not None:
+            written["robot"] = _goal_to_dict(goal.robot)
+        return written
     kind, keys = next((kind, keys) for kind, (cls, keys) in _GOALS.items() if isinstance(goal, cls))
     return {"kind": kind, **{key: _plain(getattr(goal, key)) for key in keys}}
 
@@ -339,7 +341,8 @@ def _object_goals(data: Mapping[str, Any]) -> ObjectGoals:
         row = known_keys(name, place, tuple(_PLACE), ("id", "pose", "radius"))
         row = {"heading_tolerance": math.pi, "symmetry": 1, "group": None, **row}
         for key in ("id", "symmetry", "group"):
-            row[key] = None if row[key] is None else integer(f"{name}.{key}", row[key])
+            if row[key] is not None:
+                row[key] = integer(f"{name}.{key}", row[key])
         for key in ("radius", "heading_tolerance"):
             row[key] = number(f"{name}.{key}", row[key], low=0.0, open_low=True)
         row["pose"] = array(f"{name}.pose", row["pose"], (3,))
