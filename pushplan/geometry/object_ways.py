@@ -1,4 +1,4 @@
-"""How far objects are from where a goal wants them, for goals of all kinds."""
+"""Ways of objects to where a goal wants them, for goals of all kinds."""
 
 from __future__ import annotations
 

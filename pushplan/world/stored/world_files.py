@@ -74,7 +74,7 @@ _PLACE = {
     "symmetry": "symmetries",
     "group": "groups",
 }
-"""What a file says of the place of an object, and the field of `ObjectGoals` that takes it."""
+"""Keys of the place of an object, and the fields of `ObjectGoals` that take them."""
 
 
 def world_to_dict(world: World) -> dict[str, Any]:
