@@ -253,7 +253,7 @@ class Navigator:
         self._clock, self._time = now, self._time + min(max(passed, 0.0), self._max_age)
         if not self._outcome[0]:
             self._judge(command, world, self._time, left)
-        stands = command.twist.linear == 0.0 == command.twist.angular
+        stands = command.twist == Twist(0.0, 0.0)
         outcome = self._outcome if stands else ("", "")
         if outcome[0]:
             self._goal = None

@@ -104,6 +104,7 @@ class PushplanNode(LifecycleNode):  # type: ignore[misc]
         try:
             self._configure()
         except (PushplanError, NavigationError, OSError) as error:
+            self._release()
             self.get_logger().error(str(error))
             return TransitionCallbackReturn.FAILURE
         return super().on_configure(state)

@@ -87,9 +87,11 @@ class Scene:
             most: price of a cell of 99; see `pushplan.world.PriceMap`.
         """
         static = static_map_from(message, self.frame, occupied=_LETHAL)
-        self._price = price_map_from(message, self.frame, most=most)
-        if static != self._static:
-            self._static = static
+        price = price_map_from(message, self.frame, most=most)
+        with self._lock:
+            self._price = price
+            if static != self._static:
+                self._static = static
 
     def pose(self, message: Any) -> FloatArray:
         """(3,) pose in the world frame of a message with a header and a pose.

@@ -122,9 +122,10 @@ class TwistLimiter:
 
     Ruckig (Berscheid and Kröger, "Jerk-limited Real-time Trajectory Generation with Arbitrary
     Target States", RSS 2021) gives the time-optimal change from the present to the wanted speed;
-    the command is where that change has got to after one period. Speed and turn rate change
-    independently; one whose acceleration is unlimited gets what is wanted at once. Where there is
-    no Ruckig (it has no wheel for Linux on ARM) accelerations are limited and jerk is not.
+    the command is where that change has got to after one period. Speeds ahead and to the side
+    and turn rate change independently; one whose acceleration is unlimited gets what is wanted at
+    once. Where there is no Ruckig (it has no wheel for Linux on ARM) accelerations
+    are limited and jerk is not.
 
     Args:
         robot: gives the limits.
@@ -138,11 +139,13 @@ class TwistLimiter:
         number("jerk_time", jerk_time, low=0.0, open_low=True)
         self.robot = expect("robot", robot, RobotModel)
         self._speed = _AxisLimiter(robot.max_acceleration, jerk_time)
+        self._lateral = _AxisLimiter(robot.max_acceleration, jerk_time)
         self._turn = _AxisLimiter(robot.max_turn_acceleration, jerk_time)
 
-    def reset(self, linear: float = 0.0, angular: float = 0.0) -> None:
-        """Start from a known twist [m/s, rad/s], without acceleration."""
+    def reset(self, linear: float = 0.0, angular: float = 0.0, lateral: float = 0.0) -> None:
+        """Start from a known twist [m/s, rad/s, m/s], without acceleration."""
         self._speed.reset(linear)
+        self._lateral.reset(lateral)
         self._turn.reset(angular)
 
     def step(self, wanted: Twist, period: float) -> Twist:
@@ -153,9 +156,13 @@ class TwistLimiter:
             period: time until the next call [s], positive.
         """
         number("period", period, low=0.0, open_low=True)
-        wanted = clamp_twist(self.robot, wanted.linear, wanted.angular)
-        linear = self._speed.step(wanted.linear, period)
-        return clamp_twist(self.robot, linear, self._turn.step(wanted.angular, period))
+        wanted = clamp_twist(self.robot, wanted.linear, wanted.angular, wanted.lateral)
+        return clamp_twist(
+            self.robot,
+            self._speed.step(wanted.linear, period),
+            self._turn.step(wanted.angular, period),
+            self._lateral.step(wanted.lateral, period),
+        )
 
 
 class _AxisLimiter:

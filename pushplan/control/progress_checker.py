@@ -106,7 +106,7 @@ class StallChecker:
         """Take the pose (3,) at a time [s]; returns True if something stops the robot."""
         if self._from is not None:
             seconds = time - self._time
-            self._told += seconds * self._path(self._command.linear, self._command.angular)
+            self._told += seconds * self._path(self._command.course[0], self._command.angular)
         self._time = time
         if self._from is None:
             self._begin(pose, time)

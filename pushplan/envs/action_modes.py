@@ -29,6 +29,8 @@ class ActionMode(ABC):
     """Number of elements of an action."""
     takes_velocities: ClassVar[bool] = True
     """True if a `Twist` or `WheelSpeeds` can be encoded."""
+    takes_lateral: ClassVar[bool] = False
+    """True if that `Twist` may have a lateral velocity."""
 
     def __init__(self, task: Task) -> None:
         self.robot = task.robot
@@ -67,10 +69,17 @@ class ActionMode(ABC):
         """The array in the action space nearest to a command.
 
         Raises:
-            InvalidInputError: if the command is not finite or has the wrong shape.
+            InvalidInputError: if the command is not finite or has the wrong shape, or is a lateral
+                velocity, which these actions do not have.
         """
         if isinstance(action, Twist | WheelSpeeds):
-            action = self._from_twist(self._twist(action))
+            twist = self._twist(action)
+            if twist.lateral and not self.takes_lateral:
+                raise InvalidInputError(
+                    "these actions have no lateral velocity, make the environment with "
+                    f"action='omnidirectional'; got {twist.lateral:g} m/s"
+                )
+            action = self._from_twist(twist)
         return self.read(action).astype(np.float32)
 
     def afterwards(self, command: Twist) -> Twist:
@@ -158,6 +167,7 @@ class OmnidirectionalAction(ActionMode):
     """
 
     size = 3
+    takes_lateral = True
 
     def start(self, action: FloatArray, world: World) -> Motion:
         """One command within the limits of speed and turn rate."""

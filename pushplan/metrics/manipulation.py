@@ -12,7 +12,16 @@ from scipy.spatial.distance import cdist
 from pushplan.geometry import VisibilityGraph, object_ways
 from pushplan.geometry.object_ways import shared_ways
 from pushplan.metrics.lengths import interaction_work, object_path_lengths, robot_path_length
-from pushplan.world import AreaGoal, Episode, GoalDisc, ObjectGoals, Receptacle, StaticMap, World
+from pushplan.world import (
+    AreaGoal,
+    Episode,
+    GoalDisc,
+    ManipulationGoal,
+    ObjectGoals,
+    Receptacle,
+    StaticMap,
+    World,
+)
 from pushplan.world.checks import BoolArray, FloatArray
 from pushplan.world.outline import centroid
 
@@ -97,7 +106,11 @@ def shortest_lengths(start: World, chosen: BoolArray, *, reference: bool = False
         reference: as in `manipulation_scores`.
     """
     lengths = np.zeros(len(chosen))
-    goal = start.manipulation_goal
+    goal: ManipulationGoal | None = start.manipulation_goal
+    if isinstance(goal, ObjectGoals):  # nobody goes to a place that is taken at the start
+        goal = goal.left(start.movables.ids, start.movables.poses)
+    if goal is None:
+        return lengths
     ids = start.movables.ids[chosen]
     places = start.movables.poses[chosen, :2]
     if reference:

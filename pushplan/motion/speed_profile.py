@@ -13,6 +13,7 @@ from pushplan.motion.keep_out import keep_out
 from pushplan.motion.swept_path import SweptPath
 from pushplan.world import GoalDisc, InvalidInputError, Plan, RobotModel, World
 from pushplan.world.checks import FloatArray
+from pushplan.world.polyline import arc_lengths
 
 TIGHTEST = 0.1
 """Least turning radius that plans ever use, in circumscribed radii: nearly on the spot."""
@@ -93,7 +94,7 @@ def timed_plan(
         world: the snapshot that the path starts from.
         path: poses, curvatures, predicted objects, lengths and works.
         turn_fraction: fraction of the greatest turn rate that is used.
-        chords: (N - 1,) distances between the poses [m]; by ``path.lengths`` if None.
+        chords: (N - 1,) distances between the poses [m]; by the lengths of the path if None.
     """
     robot = world.robot
     count = len(path.poses)
@@ -101,7 +102,10 @@ def timed_plan(
     vx, vy, omega = (float(value) for value in world.robot_twist)
     theta = float(world.robot_pose[2])
     times, speeds, turn_rates = np.empty((3, count))
-    chords = np.diff(path.lengths) if chords is None else chords
+    lengths = path.lengths
+    if world.price is not None:  # in those a metre counts by its price
+        lengths = arc_lengths(path.poses)
+    chords = np.diff(lengths) if chords is None else chords
     if robot.slides:
         times, speeds, turn_rates = _sliding_profile(
             robot, path.poses, turn_fraction * robot.max_turn_rate, np.array([vx, vy])
@@ -126,7 +130,7 @@ def timed_plan(
         poses=path.poses,
         speeds=speeds,
         turn_rates=turn_rates,
-        travel_cost=robot.mass * float(path.lengths[-1]),
+        travel_cost=robot.mass * float(lengths[-1]),
         interaction_cost=float(path.works[-1]),
         object_poses=path.objects,
     )

@@ -26,7 +26,8 @@ class StateObservation(LimitedVector, CheckedFields):
     is there. The rows are in the order of the ids: an object has the row of its id, so that it
     keeps it while others leave the floor, unless an id is no row; then the objects follow each
     other, and of too many the nearest are kept. Rows of absent objects are zero. A goal disc is
-    given by its centre, a line by its nearest point, a receptacle or clearance area by its middle.
+    given by its centre, a line by its nearest point, a receptacle or clearance area by its middle,
+    places of objects by the mean of all: which object belongs where is not in it.
 
     Args:
         max_objects: rows for objects.

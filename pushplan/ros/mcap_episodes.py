@@ -155,6 +155,9 @@ def _episode(logged: Mapping[str, list[Any]]) -> Episode:
     # a robot's own: from what it saw, and the commands that it got
     commands = logged[COMMAND]
     dropped = [int(one["notes"]) for one in logged[DROPPED]]
+    names = ["linear", "angular"]
+    if world.robot.slides:
+        names = ["linear", "lateral", "angular"]
     last = world.moved(robot_pose=recorded["robot_poses"][-1], movable_poses=poses[-1])
     ended = commands[-1].status if commands else "no command"
     return Episode(
@@ -163,6 +166,8 @@ def _episode(logged: Mapping[str, list[Any]]) -> Episode:
         success=last.goal_reached,
         reason="goal" if last.goal_reached else ended,
         completed=last.completed if world.goal_kind == "objects" else None,
-        actions=np.reshape([[one.linear, one.angular] for one in commands], (-1, 2)),
+        actions=np.reshape(
+            [[getattr(one, name) for name in names] for one in commands], (-1, len(names))
+        ),
         about={"source": "a robot's log", "dropped": sum(dropped)},
     )

@@ -137,6 +137,7 @@ class McapWriter:
             plan_age=command.plan_age,
             world_age=command.world_age,
             late=command.late,
+            lateral=command.twist.lateral,
         )
         twist = self._messages.twist_stamped(command.twist, command.time)
         self._put("/cmd_vel", command.time, twist)

@@ -33,7 +33,8 @@ OWN_MESSAGES = {
         "string reason\n"
         "float64 plan_age\n"
         "float64 world_age\n"
-        "bool late"
+        "bool late\n"
+        "float64 lateral"
     ),
     "pushplan_msgs/msg/Episode": "std_msgs/Header header\nstring json",
 }

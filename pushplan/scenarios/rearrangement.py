@@ -46,7 +46,7 @@ def generate_rearrangement(
     tolerance: float = 0.02,
     heading_tolerance: float = HEADING_TOLERANCE,
 ) -> World:
-    """A square room with objects, each of which has a place and a heading.
+    """A room with objects, each of which has a place and a heading.
 
     Places keep so far from the walls that the robot gets behind an object on any side of it.
 
@@ -78,6 +78,12 @@ def generate_rearrangement(
     radius = max(float(np.hypot(*part.T).max()) for part in outline)
     margin = _FREE * 2.0 * robot.circumscribed_radius + radius
     low = -0.5 * sides + margin
+    if (low >= 0.0).any():
+        least = 2.0 * margin
+        raise ScenarioError(
+            f"the room must be wider than {least:.3g} m for this robot, "
+            f"got {sides[0]:g} x {sides[1]:g} m"
+        )
     apart = _APART * 2.0 * radius
     for _ in range(_TRIES):
         starts = _spread_out(rng, count + others, low, apart)
@@ -102,7 +108,14 @@ def generate_rearrangement(
     return World(robot, _free_start(rng, robot, static, movables), static, movables, goal)
 
 
-def load_relopush(path: str | Path, index: int, *, robot: RobotModel, **tolerances: float) -> World:
+def load_relopush(
+    path: str | Path,
+    index: int,
+    *,
+    robot: RobotModel,
+    tolerance: float = 0.02,
+    heading_tolerance: float = HEADING_TOLERANCE,
+) -> World:
     """One instance of a file of ReloPush (Ahn and Mavrogiannis, arXiv 2409.18231).
 
     Args:
@@ -110,7 +123,8 @@ def load_relopush(path: str | Path, index: int, *, robot: RobotModel, **toleranc
             pose, and ``raw_other.assign``, pairs of an object and a goal.
         index: number of the instance; one past the end begins anew.
         robot: that pushes.
-        tolerances: ``tolerance`` [m] and ``heading_tolerance`` [rad], 2 cm and 5° by default.
+        tolerance: of the positions [m].
+        heading_tolerance: [rad]; all four headings of a block are the same.
 
     Raises:
         SchemaError: if the file is missing, or not as described.
@@ -131,17 +145,20 @@ def load_relopush(path: str | Path, index: int, *, robot: RobotModel, **toleranc
         ends = np.array([array(d, one["goals"][d], (3,)) for _, d in pairs])
         ids = np.array([order[b] for b, _ in pairs])
         pose = array("robot", one["robot"], (3,))
+        if len(set(pairs)) != len({d for _, d in pairs}) or not pairs:
+            raise SchemaError(f"{name}: each goal needs an object of its own, got {short(pairs)}")
+    except InvalidInputError as error:
+        raise SchemaError(f"{name}: {error}") from error
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise SchemaError(f"{name}: {short(error)} does not fit") from error
     half = 0.5 * _RELOPUSH_SIDE
     box = np.array([(-half, -half), (half, -half), (half, half), (-half, half)])
-    given = {"tolerance": 0.02, "heading_tolerance": HEADING_TOLERANCE, **tolerances}
     count = len(ids)
     goal = ObjectGoals(
         ids,
         ends,
-        np.full(count, given["tolerance"]),
-        np.full(count, given["heading_tolerance"]),
+        np.full(count, tolerance),
+        np.full(count, heading_tolerance),
         np.full(count, 4),
     )
     movables = Movables.from_outlines([box] * len(starts), starts, density=_DENSITY)

@@ -19,6 +19,7 @@ from pushplan.world import (
     PlansBesideDriving,
     Policy,
     ShowsPlan,
+    Twist,
     WheelSpeeds,
     World,
     stream,
@@ -37,6 +38,14 @@ SETTINGS = (
     "keep_unseen",
 )
 """Settings of a client, as arguments of `Runner`; ``planning_limit`` holds for both kinds."""
+
+
+def velocities(twist: Twist) -> dict[str, float]:
+    """The fields of a command; ``lateral`` only where it is not 0."""
+    fields = asdict(twist)
+    if not twist.lateral:
+        del fields["lateral"]
+    return fields
 
 
 class PlanCount:
@@ -92,7 +101,7 @@ class StepEpisode:
         if isinstance(action, WheelSpeeds):
             fields["wheels"] = asdict(action)
         if "wheels" not in fields or world.robot.wheel_separation > 0.0:
-            fields["twist"] = asdict(twist_of(world, action))
+            fields["twist"] = velocities(twist_of(world, action))
         plan = None if self._shows is None else self._shows.current_plan
         plans = self._plans.fields(plan, world.time, with_plan)
         return {**fields, "done": world.goal_reached, **plans}
@@ -143,7 +152,7 @@ class LoopEpisode:
         return {
             "type": "command",
             "time": command.time,
-            "twist": asdict(command.twist),
+            "twist": velocities(command.twist),
             "status": command.status.value,
             "reason": command.reason,
             "world_age": command.world_age,

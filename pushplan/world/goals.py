@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
@@ -18,6 +18,8 @@ from pushplan.world.outline import convex_outline, next_corner, signed_area
 if TYPE_CHECKING:
     from pushplan.world.movables import Movables
 
+_MOST_TURN = 1e3
+"""Of a heading [rad]; beyond it rounding takes too much of it."""
 Point = Annotated[FloatArray, Shape(2)]
 
 
@@ -62,7 +64,7 @@ class GoalPose(GoalDisc):
         heading_tolerance: to either side [rad], positive, at most π.
     """
 
-    heading: Annotated[float, Limits(-1e3, 1e3)]
+    heading: Annotated[float, Limits(-_MOST_TURN, _MOST_TURN)]
     heading_tolerance: Annotated[float, Limits(0.0, math.pi, open_low=True)]
 
     @property
@@ -250,12 +252,12 @@ class ObjectGoals(ArrayRecord, CheckedFields):
 
     def __post_init__(self) -> None:
         count = len(array("goal.ids", self.ids, (None,), dtype=np.int64))
+        if not count:
+            raise InvalidInputError("goal.ids must name at least one object")
         for name, default in (("symmetries", np.ones(count)), ("groups", np.arange(count))):
             if getattr(self, name) is None or np.array_equal(getattr(self, name), []):
                 object.__setattr__(self, name, default.astype(np.int64))
         super().__post_init__()
-        if not count:
-            raise InvalidInputError("goal.ids must name at least one object")
         if len(np.unique(self.ids)) != count:
             raise InvalidInputError(f"goal.ids must be distinct, got {self.ids.tolist()}")
         for name, low, high in (
@@ -268,6 +270,17 @@ class ObjectGoals(ArrayRecord, CheckedFields):
             if len(wrong):
                 most = f" and at most {high:g}" if high < math.inf else ""
                 raise InvalidInputError(f"goal.{name} must be positive{most}, got {wrong[0]:g}")
+        if (np.abs(self.poses[:, 2]) > _MOST_TURN).any():
+            most = np.abs(self.poses[:, 2]).max()
+            raise InvalidInputError(
+                f"goal.poses must turn by at most {_MOST_TURN:g} rad, got {most:g}"
+            )
+        for group in np.unique(self.groups):
+            own = self.symmetries[self.groups == group]
+            if (own != own[0]).any():
+                raise InvalidInputError(
+                    f"goal.symmetries must be equal within group {group}, got {own.tolist()}"
+                )
 
     @cached_property
     def places(self) -> tuple[GoalPose, ...]:
@@ -328,6 +341,25 @@ class ObjectGoals(ArrayRecord, CheckedFields):
             turns[chosen] <= self.heading_tolerances[at[k]]
         )
         return done
+
+    def left(self, ids: IntArray, poses: FloatArray) -> ObjectGoals | None:
+        """The goal of the objects that are not at their places, without the places of the others.
+
+        Args:
+            ids: (K,) of the objects.
+            poses: (K, 3) of them.
+        """
+        at = self.assigned(ids, poses)
+        there = self.reached(ids, poses) & (at >= 0)
+        objects = np.flatnonzero(~np.isin(self.ids, ids[there]))
+        places = np.flatnonzero(~np.isin(np.arange(len(self.ids)), at[there]))
+        if not len(objects):
+            return None
+        objects = objects[np.argsort(self.groups[objects], kind="stable")]
+        places = places[np.argsort(self.groups[places], kind="stable")]
+        names = ("poses", "radii", "heading_tolerances", "symmetries", "groups")
+        of_places: dict[str, Any] = {name: getattr(self, name)[places] for name in names}
+        return ObjectGoals(self.ids[objects], **of_places, robot=self.robot)
 
     def done(self, movables: Movables) -> BoolArray:
         """(K,) which objects are where they should be; those without a place are."""

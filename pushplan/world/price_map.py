@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from pushplan.errors import InvalidInputError
 from pushplan.world.checked_fields import CheckedFields, PositiveFloat, Shape
-from pushplan.world.checks import ArrayRecord, FloatArray, number
+from pushplan.world.checks import ArrayRecord, FloatArray, array, number
 
 _MOST_PRICED = 99
 """Greatest value of a costmap that is a price: its inscribed cells [%]. 100 is lethal."""
@@ -56,6 +56,9 @@ class PriceMap(ArrayRecord, CheckedFields):
             origin: (3,) as of the class.
             most: price of a cell of 99, from where the inscribed circle touches something.
         """
-        cells = np.asarray(grid)
+        cells = array("grid", grid, (None, None))
+        wrong = cells[(cells < -1.0) | (cells > 100.0)]
+        if len(wrong):
+            raise InvalidInputError(f"grid must hold values from -1 to 100, got {wrong[0]:g}")
         priced = np.where((cells > 0) & (cells <= _MOST_PRICED), cells, 0)
         return cls(priced * (number("most", most, low=0.0) / _MOST_PRICED), resolution, origin)  # type: ignore[arg-type]

@@ -131,7 +131,7 @@ class World(ArrayRecord, CheckedFields):
         """
         if not isinstance(self.goal, AreaGoal):
             raise InvalidInputError(
-                "this needs an area for the objects (Receptacle or ClearanceArea), "
+                "this needs a goal for the objects that is an area (Receptacle or ClearanceArea), "
                 f"got {type(self.goal).__name__}"
             )
         return self.goal

@@ -89,7 +89,7 @@ def test_list(kind: str, name: str, capsys: pytest.CaptureFixture[str]) -> None:
 def test_list_says_what_each_policy_and_suite_is_for(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["list", "all"]) == 0
     lines = {line.split()[0]: line for line in capsys.readouterr().out.splitlines()}
-    assert re.search(r" box_delivery,area_clearing +velocity ", lines["gtsp-mpc"])
+    assert re.search(r" box_delivery,area_clearing,rearrange +velocity ", lines["gtsp-mpc"])
     assert " ship_ice " in lines["ship-predictive"] and " any " in lines["random"]
     assert " box_delivery " in lines["box-delivery-sac"] and "SAC" in lines["box-delivery-sac"]
     assert " maze " in lines["maze-2d-5"] and " turn_rate " in lines["maze-2d-5"]

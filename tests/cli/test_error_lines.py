@@ -229,7 +229,7 @@ def test_a_world_file_is_no_suite(capsys: pytest.CaptureFixture[str]) -> None:
         (
             "kind: disc",
             "kind: circle",
-            "'circle' (valid: clearance_area, disc, line, pose, receptacle)",
+            "'circle' (valid: clearance_area, disc, line, objects, pose, receptacle)",
         ),
         ("mass: 1.07", "mass: .inf", "robot.mass must lie in (0, inf), got inf"),
         ("mass: 1.07", "mass: -1.07", "robot.mass must lie in (0, inf), got -1.07"),

@@ -97,7 +97,7 @@ def test_two_clients_at_once_do_what_each_does_alone(tmp_path):
 def test_the_server_says_what_it_serves(tmp_path):
     with served("straight", tmp_path) as server, PolicyClient(server.address, 0.1) as client:
         assert client.server["protocol"] == PROTOCOL and client.server["policy"] == "straight"
-        assert client.server["actions"] == ["turn_rate", "velocity"]
+        assert client.server["actions"] == ["turn_rate", "velocity", "omnidirectional"]
         assert client.server["goals"] == ["disc", "pose", "line"] and client.server["period"] == 0.1
         assert client.server["limits"]["message_bytes"] == 4_000_000
 

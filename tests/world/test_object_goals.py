@@ -102,7 +102,7 @@ def test_files_keep_every_value():
     goal = goals(
         [(1.0, 0.0, 0.3), (0.0, 1.0, 0.0)],
         ids=[4, 9],
-        symmetries=[4, 1],
+        symmetries=[4, 4],
         groups=[2, 2],
         robot=GoalDisc([0.0, -1.0], 0.1),
     )
@@ -146,3 +146,17 @@ def test_wrong_goals_are_refused():
         goals([(0.0, 0.0, 0.0)], radii=[-1.0])
     with pytest.raises(InvalidInputError, match="robot"):
         goals([(0.0, 0.0, 0.0)], robot="there")
+
+
+def test_a_place_that_is_taken_is_no_place_for_others():
+    goal = goals([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)], groups=[1, 1])
+    left = goal.left(np.array([0, 1]), np.array([(1.0, 0.0, 0.0), (0.5, 0.0, 0.0)]))
+    assert (left.ids.tolist(), left.poses[:, 0].tolist()) == ([1], [0.0])
+    assert goal.left(np.array([0, 1]), np.array([(1.0, 0.0, 0.0), (0.0, 0.0, 0.0)])) is None
+
+
+def test_a_group_has_one_symmetry():
+    with pytest.raises(InvalidInputError, match="equal within group 3"):
+        goals([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)], groups=[3, 3], symmetries=[4, 1])
+    with pytest.raises(InvalidInputError, match="turn by at most 1000"):
+        goals([(0.0, 0.0, 1e4)])

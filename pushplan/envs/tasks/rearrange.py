@@ -38,7 +38,8 @@ class RearrangeVariations(WorldVariations):
     obstacles: NonNegativeInt = 0  # objects that may be anywhere in the end
     room: PositiveFloat | None = None  # side of the square room [m]
     tolerance: PositiveFloat = 0.02  # of the positions [m]
-    heading_tolerance: PositiveFloat = HEADING_TOLERANCE  # [rad]
+    # to either side [rad]
+    heading_tolerance: Annotated[float, Limits(0.0, math.pi, open_low=True)] = HEADING_TOLERANCE
     # of ReloPush, whose room and objects then count, and the number of one, drawn if None
     instances: str | None = None
     instance: NonNegativeInt | None = None
@@ -72,6 +73,8 @@ class RearrangeTask(RoomTask):
         if wanted.instances is not None:
             room = RELOPUSH_ROOM
         self.reach = 2.0 * math.hypot(*room)
+        if wanted.instances is not None:  # a file that is not there is refused before a start
+            load_relopush(wanted.instances, 0, robot=self.robot)
 
     def start(self, rng: np.random.Generator) -> World:
         """A new room, or the next instance of the file."""

@@ -49,6 +49,9 @@ def world_ahead(
         return world, None
     speed, turn = twists[-1]
     theta = float(poses[-1, 2])
+    dx, dy = (poses[-1] - poses[-2])[:2].tolist()
+    if world.robot.slides and (dx or dy):
+        theta = math.atan2(dy, dx)
     ahead = world.moved(
         robot_pose=poses[-1],
         robot_twist=[speed * math.cos(theta), speed * math.sin(theta), turn],

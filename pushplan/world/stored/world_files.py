@@ -200,7 +200,9 @@ def load_world(path: str | Path) -> World:
 
 
 def save_world(world: World, path: str | Path) -> None:
-    """Write a world to a ``.json``, ``.yaml`` or ``.yml`` file; `load_world` gives it back equal.
+    """Write a world to a ``.json``, ``.yaml`` or ``.yml`` file.
+
+    `load_world` gives it back equal, but for prices, which files leave out.
 
     Raises:
         SchemaError: if the ending is none of these.
@@ -342,7 +344,7 @@ def _object_goals(data: Mapping[str, Any]) -> ObjectGoals:
         row = {"heading_tolerance": math.pi, "symmetry": 1, "group": None, **row}
         for key in ("id", "symmetry", "group"):
             if row[key] is not None:
-                row[key] = integer(f"{name}.{key}", row[key])
+                row[key] = integer(f"{name}.{key}", row[key], low=-(2**62), high=2**62)
         for key in ("radius", "heading_tolerance"):
             row[key] = number(f"{name}.{key}", row[key], low=0.0, open_low=True)
         row["pose"] = array(f"{name}.pose", row["pose"], (3,))

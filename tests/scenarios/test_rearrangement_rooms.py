@@ -62,6 +62,9 @@ def test_the_same_seed_draws_the_same_room():
 
 
 def test_too_many_objects_are_refused():
+    for room in ((0.5, 0.5), (-1.0, -1.0)):
+        with pytest.raises(ScenarioError, match="wider than"):
+            generate_rearrangement(np.random.default_rng(0), robot=ROBOT, room=room)
     with pytest.raises(ScenarioError, match="30 objects do not fit"):
         generate_rearrangement(np.random.default_rng(0), robot=ROBOT, objects=30, room=(1.5, 1.5))
     for wrong in ({"objects": 0}, {"shape": "z"}, {"arrangement": 3}, {"tolerance": -1.0}):
@@ -94,6 +97,8 @@ def test_instances_of_relopush_are_read(tmp_path):
         {"objects": 3},
         {"raw_other": {"assign": [["b1", "d9"]]}},
         {"speed": 3},
+        {"raw_other": {"assign": [["b1", "d1"], ["b2", "d1"]]}},
+        {"objects": {}, "goals": {}, "raw_other": {}},
     ],
 )
 def test_wrong_instances_are_refused(tmp_path, wrong):
