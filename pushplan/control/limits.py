@@ -29,7 +29,7 @@ def clamp_twist(robot: RobotModel, linear: float, angular: float, lateral: float
     expect("robot", robot, RobotModel)
     linear = number("linear", linear, finite=False)
     angular = number("angular", angular, finite=False)
-    if robot.drive is Drive.OMNIDIRECTIONAL:
+    if robot.slides:
         lateral = number("lateral", lateral, finite=False)
         linear, lateral = (min(max(v, -_ENDLESS), _ENDLESS) for v in (linear, lateral))
         slower = min(1.0, robot.max_speed / max(math.hypot(linear, lateral), 1e-12))
@@ -88,7 +88,7 @@ def ramp_twist(
     dv = robot.max_acceleration * period
     dw = robot.max_turn_acceleration * period
     change = math.hypot(linear - last.linear, lateral - last.lateral)
-    if robot.drive is Drive.OMNIDIRECTIONAL and change > dv:
+    if robot.slides and change > dv:
         linear = last.linear + (linear - last.linear) * dv / change
         lateral = last.lateral + (lateral - last.lateral) * dv / change
     linear = min(max(linear, last.linear - dv), last.linear + dv)
@@ -122,10 +122,10 @@ class TwistLimiter:
 
     Ruckig (Berscheid and Kröger, "Jerk-limited Real-time Trajectory Generation with Arbitrary
     Target States", RSS 2021) gives the time-optimal change from the present to the wanted speed;
-    the command is where that change has got to after one period. Speeds ahead and to the side
-    and turn rate change independently; one whose acceleration is unlimited gets what is wanted at
-    once. Where there is no Ruckig (it has no wheel for Linux on ARM) accelerations
-    are limited and jerk is not.
+    the command is where that change has got to after one period. Speeds ahead and to the side and
+    turn rate change independently; one whose acceleration is unlimited gets what is wanted at once.
+    Where there is no Ruckig (it has no wheel for Linux on ARM) accelerations are limited and jerk
+    is not.
 
     Args:
         robot: gives the limits.

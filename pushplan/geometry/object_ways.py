@@ -9,6 +9,7 @@ import numpy as np
 from pushplan.geometry.shortest_path import goal_distances
 from pushplan.world import AreaGoal, GoalDisc, ManipulationGoal, ObjectGoals, StaticMap
 from pushplan.world.checks import FloatArray, IntArray
+from pushplan.world.goals import least_pairing
 
 Ways = Callable[[AreaGoal | GoalDisc, FloatArray], FloatArray]
 """From an area or a disc, and (N, 2) points [m], to the (N,) ways from them [m], inf for none."""
@@ -48,18 +49,3 @@ def shared_ways(
         lengths = np.column_stack([ways(goal.places[g], places[k]) for g in own.tolist()])
         found[k] = lengths[np.arange(len(k)), least_pairing(lengths)]
     return found
-
-
-def least_pairing(costs: FloatArray) -> IntArray:
-    """(N,) column for each row of (N, M >= N) costs, so that their sum is least.
-
-    Costs that are infinite are taken only where a row has no other column left.
-    """
-    if costs.shape[1] == 1:
-        return np.zeros(len(costs), dtype=np.int64)
-    from scipy.optimize import linear_sum_assignment  # takes longer than the rest of this room
-
-    finite = np.isfinite(costs)
-    most = 1.0 + 2.0 * float(np.abs(costs[finite]).sum())
-    columns: IntArray = linear_sum_assignment(np.where(finite, costs, most))[1].astype(np.int64)
-    return columns

@@ -20,7 +20,7 @@ TIGHTEST = 0.1
 
 _WIDEST = 1e5
 """Greatest turning radius of vehicles that lattices are made for, in circumscribed radii."""
-_STRAIGHT = 1e-12  # length [m], curvature [1/m] or bend [rad] that counts as none
+_STRAIGHT = 1e-12  # length [m], curvature [1/m] or change of bearing [rad] that counts as none
 _FRACTIONS = (1.0, 0.5, 0.25, 0.1, 0.0)
 """Fractions of the margin that are tried in turn where a robot starts near a wall."""
 
@@ -157,13 +157,13 @@ def _sliding_profile(
     if len(moves) and min(robot.max_acceleration, robot.max_turn_acceleration) < math.inf:
         between = 0.5 * (lengths[1:] + lengths[:-1])
         bearings = np.arctan2(moves[:, 1], moves[:, 0]) - poses[1:, 2]  # in the body frame
-        bends = np.maximum(np.abs(wrap_angle(np.diff(bearings))), _STRAIGHT)
+        swings = np.maximum(np.abs(wrap_angle(np.diff(bearings))), _STRAIGHT)
         curvatures = np.diff(poses[:, 2]) / np.maximum(lengths, _STRAIGHT)
         changes = np.maximum(np.abs(np.diff(curvatures)), _STRAIGHT)
         acceleration = math.sqrt(0.5) * robot.max_acceleration
         turning = 0.5 * robot.max_turn_acceleration
         gains = np.minimum(acceleration, turning / np.maximum(np.abs(curvatures), _STRAIGHT))
-        allowed = np.sqrt(np.minimum(acceleration / bends, turning / changes) * between)
+        allowed = np.sqrt(np.minimum(acceleration / swings, turning / changes) * between)
         rates[1:] = np.minimum(rates[1:], allowed)
         rates[:-1] = np.minimum(rates[:-1], allowed)
         first = max(float(moves[0] @ velocity) / max(float(lengths[0]), _STRAIGHT), 0.0)

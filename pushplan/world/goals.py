@@ -288,10 +288,6 @@ class ObjectGoals(ArrayRecord, CheckedFields):
         rows = zip(self.poses, self.radii.tolist(), self.heading_tolerances.tolist(), strict=True)
         return tuple(GoalPose(pose[:2], radius, pose[2], turn) for pose, radius, turn in rows)
 
-    def wanted(self, ids: IntArray) -> BoolArray:
-        """(K,) which objects have a place."""
-        return np.isin(ids, self.ids)
-
     def errors(self, poses: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Distance [m] and least turn [rad], up to symmetry, from (..., 1 or G, 3) poses."""
         away = poses - self.poses
@@ -309,16 +305,12 @@ class ObjectGoals(ArrayRecord, CheckedFields):
             ids: (K,) of the objects.
             poses: (K, 3) of them.
         """
-        from scipy.optimize import linear_sum_assignment  # takes longer than the rest of this room
-
         found = np.full(len(ids), -1)
         rows = {int(label): k for k, label in enumerate(ids)}
         for group in np.unique(self.groups):
             places = np.flatnonzero(self.groups == group)
             objects = [rows[label] for label in self.ids[places].tolist() if label in rows]
-            if len(places) == 1:
-                found[objects] = places[0]
-            elif objects:
+            if objects:
                 distances, turns = (
                     values[:, places] for values in self.errors(poses[objects, None])
                 )
@@ -326,8 +318,8 @@ class ObjectGoals(ArrayRecord, CheckedFields):
                     turns > self.heading_tolerances[places]
                 )
                 penalty = 1.0 + float(distances.sum())
-                chosen = linear_sum_assignment(np.where(missed, penalty + distances, 0.0))
-                found[np.array(objects)[chosen[0]]] = places[chosen[1]]
+                costs = np.where(missed, penalty + distances, 0.0)
+                found[objects] = places[least_pairing(costs)]
         return found
 
     def reached(self, ids: IntArray, poses: FloatArray) -> BoolArray:
@@ -364,6 +356,21 @@ class ObjectGoals(ArrayRecord, CheckedFields):
     def done(self, movables: Movables) -> BoolArray:
         """(K,) which objects are where they should be; those without a place are."""
         return self.reached(movables.ids, movables.poses)
+
+
+def least_pairing(costs: FloatArray) -> IntArray:
+    """(N,) column for each row of (N, M >= N) costs, so that their sum is least.
+
+    Costs that are infinite are taken only where a row has no other column left.
+    """
+    if costs.shape[1] == 1:
+        return np.zeros(len(costs), dtype=np.int64)
+    from scipy.optimize import linear_sum_assignment  # takes longer than the rest of this room
+
+    finite = np.isfinite(costs)
+    most = 1.0 + 2.0 * float(np.abs(costs[finite]).sum())
+    columns: IntArray = linear_sum_assignment(np.where(finite, costs, most))[1].astype(np.int64)
+    return columns
 
 
 NavigationGoal = GoalDisc | GoalLine

@@ -88,11 +88,11 @@ class World(ArrayRecord, CheckedFields):
             InvalidInputError: if it is a goal for the objects.
         """
         if not isinstance(self.goal, NavigationGoal):
-            raise InvalidInputError(
-                "this needs a goal for the robot (GoalDisc, GoalPose or GoalLine), "
-                f"got {type(self.goal).__name__}"
-            )
+            raise self._needs("a goal for the robot (GoalDisc, GoalPose or GoalLine)")
         return self.goal
+
+    def _needs(self, goal: str) -> InvalidInputError:
+        return InvalidInputError(f"this needs {goal}, got {type(self.goal).__name__}")
 
     @property
     def place_goal(self) -> NavigationGoal:
@@ -116,10 +116,7 @@ class World(ArrayRecord, CheckedFields):
             InvalidInputError: if it is a goal for the robot.
         """
         if not isinstance(self.goal, ManipulationGoal):
-            raise InvalidInputError(
-                "this needs a goal for the objects (Receptacle, ClearanceArea or ObjectGoals), "
-                f"got {type(self.goal).__name__}"
-            )
+            raise self._needs("a goal for the objects (Receptacle, ClearanceArea or ObjectGoals)")
         return self.goal
 
     @property
@@ -130,9 +127,8 @@ class World(ArrayRecord, CheckedFields):
             InvalidInputError: if it is another one.
         """
         if not isinstance(self.goal, AreaGoal):
-            raise InvalidInputError(
-                "this needs a goal for the objects that is an area (Receptacle or ClearanceArea), "
-                f"got {type(self.goal).__name__}"
+            raise self._needs(
+                "a goal for the objects that is an area (Receptacle or ClearanceArea)"
             )
         return self.goal
 
@@ -145,7 +141,7 @@ class World(ArrayRecord, CheckedFields):
         """
         goal = self.manipulation_goal
         if isinstance(goal, ObjectGoals):
-            return goal.wanted(self.movables.ids)
+            return np.isin(self.movables.ids, goal.ids)
         return np.ones(len(self.movables), dtype=np.bool_)
 
     @property

@@ -21,7 +21,7 @@ def test_lengths_and_ends_agree_with_ompl(reverses, radius):
     space.setBounds(bounds)
     first, second = space.allocState(), space.allocState()
     rng = np.random.default_rng(0)
-    pieces, poses, bends = np.zeros((5, 2)), np.zeros((5000, 3)), np.zeros(5000)
+    pieces, poses, curvatures = np.zeros((5, 2)), np.zeros((5000, 3)), np.zeros(5000)
     for _ in range(1000):
         start = np.array([*rng.uniform(-4, 4, 2), rng.uniform(-4, 4)])
         end = np.array([*rng.uniform(-4, 4, 2), rng.uniform(-4, 4)])
@@ -33,11 +33,11 @@ def test_lengths_and_ends_agree_with_ompl(reverses, radius):
         assert length == pytest.approx(space.distance(first, second), abs=1e-9)
         assert length == pytest.approx(np.abs(pieces[:, 0]).sum())
         assert reverses or (pieces[:, 0] >= 0.0).all()
-        count = core.sample_pieces(start, pieces, 0.05 * radius, poses, bends)
+        count = core.sample_pieces(start, pieces, 0.05 * radius, poses, curvatures)
         miss = poses[count - 1] - end
         miss[2] = (miss[2] + np.pi) % (2 * np.pi) - np.pi
         assert np.abs(miss).max() < 1e-9 * max(1, radius)
-        assert np.abs(bends[:count]).max() <= 1 / radius + 1e-12
+        assert np.abs(curvatures[:count]).max() <= 1 / radius + 1e-12
 
 
 @pytest.mark.parametrize("reverses", SPACES)

@@ -16,7 +16,7 @@ SHARE = Path(__file__).resolve().parents[1]
 
 
 def generate_launch_description() -> LaunchDescription:
-    """What `ros2 launch` starts."""
+    """The nodes that `ros2 launch` starts."""
     params = LaunchConfiguration("params_file")
     clock = {"use_sim_time": LaunchConfiguration("use_sim_time")}
     tree = {

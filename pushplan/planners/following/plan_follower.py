@@ -16,7 +16,7 @@ from pushplan.planners.following.plan_controller import PlanController
 from pushplan.planners.following.plan_fit import PlanFit, reaction_length
 from pushplan.planners.following.planning_call import (
     PendingPlan,
-    PlanningCall,
+    PlanRequest,
     PreparedPlanner,
     without_predictions,
 )
@@ -221,7 +221,7 @@ class PlanFollower:
         if plan is not None and (curves or not reason.urgent):
             weight = self.replanning.weight(self.planner)
             comparison = self._fit.comparison(world, plan, self.interaction, weight)
-        planning = PlanningCall(self.planner, start, stretch, self._rng, comparison)
+        planning = PlanRequest(self.planner, start, stretch, self._rng, comparison)
         call = self._executor.submit(planning, world.time, self.stop)
         self._pending = PendingPlan(call, start, reason, world.time)
 

@@ -40,7 +40,7 @@ class Answer:
 
 
 @dataclass(frozen=True)
-class PlanningCall:
+class PlanRequest:
     """Plans, and does all that makes a plan ready to be driven: that keeps commands short.
 
     Args:
