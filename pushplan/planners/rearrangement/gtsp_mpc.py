@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from pushplan.control import ImmediateExecutor, PoseFollower, Recovery
+from pushplan.planners.rearrangement.placing import Placer
 from pushplan.planners.rearrangement.push import Push, PushCost, PushHistory, push_plan, signature
 from pushplan.planners.rearrangement.push_choice import (
     PendingChoice,
@@ -25,7 +26,16 @@ from pushplan.planners.rearrangement.rearrangement_policy import (
     RearrangementPolicy,
 )
 from pushplan.planners.rearrangement.rollout_cache import RolloutCache
-from pushplan.world import InvalidInputError, Plan, PlanningExecutor, Stop, Twist, World
+from pushplan.world import (
+    Drive,
+    InvalidInputError,
+    ObjectGoals,
+    Plan,
+    PlanningExecutor,
+    Stop,
+    Twist,
+    World,
+)
 from pushplan.world.checks import FloatArray, IntArray, expect
 
 _SAME_OBJECTS = 0.05  # objects have not moved if all by less [circumscribed radii]
@@ -33,6 +43,7 @@ _SAME_PLACE = 0.02  # the robot has not moved if by less [circumscribed radii, r
 _MOST_ENDS = 4  # pushes and recoveries that may end in one step until the robot waits
 _COLLECTING = 0.5  # part of a pause in which pushes are simulated and no order is made
 _SETTLING = 0.5  # time after which a robot that pauses stands, unless what it sees is noisy [s]
+_PLACING_DRIVES = (Drive.DIFFERENTIAL, Drive.CAR, Drive.OMNIDIRECTIONAL)
 _RETREAT = 0.3  # distance that the robot backs off where it makes no progress [circumscribed radii]
 
 
@@ -80,6 +91,7 @@ class GtspMpc(RearrangementPolicy):
     def _forget(self) -> None:
         super()._forget()
         self._executor: PlanningExecutor = ImmediateExecutor()
+        self._placer = Placer(self.config, self.stop)
         self._choosing: PendingChoice | None = None
         self._execution: PushExecution | None = None
         self._shown: Push | None = None
@@ -102,19 +114,31 @@ class GtspMpc(RearrangementPolicy):
     def reset(self, world: World, rng: np.random.Generator) -> None:
         """Forget the last episode; choices are made at once until `plan_with` says otherwise."""
         self._forget_choice()
+        self._placer.abandon()
         if self._execution is not None:
             self._execution.abandon()
         super().reset(world, rng)
 
     def plan_with(self, executor: PlanningExecutor) -> None:
         """See `pushplan.world.PlansBesideDriving`."""
-        self._executor = executor
+        self._executor = self._placer.executor = executor
 
     def expect_noise(self, position: float, heading: float) -> None:
         """See `pushplan.world.ExpectsNoise`."""
         self.config = replace(self.config, position_noise=position, heading_noise=heading)
 
+    def _check(self, world: World) -> None:
+        if not isinstance(world.goal, ObjectGoals):
+            super()._check(world)
+        elif not (world.robot.min_speed < 0.0 and world.robot.drive in _PLACING_DRIVES):
+            raise InvalidInputError(
+                "pushing objects to places needs a robot that drives back, with one of the drives "
+                + ", ".join(drive.value for drive in _PLACING_DRIVES)
+            )
+
     def _act(self, world: World) -> Twist:
+        if isinstance(world.goal, ObjectGoals):
+            return self._placer.command(world, self._clock.held)
         scene = self._observe(world)
         if not scene.left:
             self._execution = None

@@ -83,6 +83,8 @@ class RearrangementConfig(CheckedFields):
         static_friction: the same between objects and walls.
         gyration_scale: factor on the radius of the objects' limit surface; see
             `pushplan.interaction.QuasiStatic`.
+        grip: friction between robot and objects that is counted on where an object goes to a place
+            of its own: it gives the curves on which the object does not slip.
         later_fraction: of the cost of contacts in those, as objects will have gone by then.
         contact_cost: least cost of carrying an object along on an approach, however light it is.
         target_cost: what is added to it for the object that is to be pushed.
@@ -99,6 +101,8 @@ class RearrangementConfig(CheckedFields):
             robot's delay.
         mpc: a push of one object along its path is driven by `PushingMpc`; else by the
             controller of its prediction, as all other pushes are.
+        order: in which objects are brought to places of their own: ``"gtsp"`` by the shortest
+            tour, ``"nearest"`` first, or at ``"random"``.
         max_failures: after so many a push waits until something else has been done.
         max_relocations: after so many an object waits until something else has been done.
         position_noise: standard deviation of the places that are seen, after filtering [m]; the
@@ -114,6 +118,7 @@ class RearrangementConfig(CheckedFields):
     friction: Annotated[float, Limits(0.0, 1e6)] = 0.2
     static_friction: Annotated[float, Limits(0.0, 1e6)] = 0.0
     gyration_scale: PositiveFloat = 1.0
+    grip: Annotated[float, Limits(0.0, 10.0, open_low=True)] = 0.4
     later_fraction: Fraction = 0.5
     contact_cost: Annotated[float, Limits(0.0, 1e6)] = 1.0
     target_cost: NonNegativeFloat = 5.0
@@ -126,6 +131,7 @@ class RearrangementConfig(CheckedFields):
     max_pause: NonNegativeFloat = 3.0
     response: Annotated[float, Limits(0.0, 1e3, open_low=True)] = 0.2
     mpc: bool = True
+    order: Annotated[str, OneOf(("gtsp", "nearest", "random"))] = "gtsp"
     max_failures: PositiveInt = 3
     max_relocations: PositiveInt = 12
     position_noise: NonNegativeFloat = 0.0

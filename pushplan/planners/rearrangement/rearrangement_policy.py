@@ -39,8 +39,12 @@ class RearrangementPolicy(ABC):
         Raises:
             InvalidInputError: if the goal is one for the robot, or the robot cannot stop.
         """
-        check_pusher(world)  # before the clock takes the snapshot
+        self._check(world)  # before the clock takes the snapshot
         return self._clock.command_for(world, self._act)
+
+    def _check(self, world: World) -> None:
+        """Refuse a world that nothing can be done with."""
+        check_pusher(world)
 
     def _forget(self) -> None:
         """Begin an episode."""

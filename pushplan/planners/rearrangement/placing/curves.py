@@ -1,0 +1,146 @@
+"""Shortest curves between poses, and the way around what blocks them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pushplan.core import motion as core
+from pushplan.world.checks import FloatArray
+
+_ARCS = 5  # pieces of a curve at most
+_VIAS = 60  # random poses that a way around may lead through
+_NEAREST = 12  # of them, to which each is joined
+
+
+@dataclass(frozen=True)
+class Turning:
+    """How a body turns.
+
+    Args:
+        radius: least turning radius [m].
+        reverses: it drives back as well.
+        step: distance of the poses along a curve [m].
+    """
+
+    radius: float
+    reverses: bool
+    step: float
+
+    def length(self, start: FloatArray, end: FloatArray) -> float:
+        """Length [m] of the shortest curve between poses (3,)."""
+        arcs = np.empty((_ARCS, 2))
+        return core.shortest_curve(start, end, self.radius, self.reverses, arcs)
+
+    def poses(self, start: FloatArray, end: FloatArray) -> FloatArray:
+        """(N, 3) poses along the shortest curve, with both ends.
+
+        Sources: Dubins, American Journal of Mathematics 79 (1957); Reeds and Shepp, Pacific
+        Journal of Mathematics 145 (1990).
+        """
+        arcs = np.empty((_ARCS, 2))
+        length = core.shortest_curve(start, end, self.radius, self.reverses, arcs)
+        if not math.isfinite(length):
+            return np.empty((0, 3))
+        pieces = np.ascontiguousarray(arcs[arcs[:, 0] != 0.0])
+        room = int(length / self.step) + 4 * _ARCS
+        out = np.empty((room, 3))
+        count = core.sample_pieces(start, pieces, self.step, out, np.empty(room))
+        return np.vstack([start, out[:count]])
+
+
+def is_clear(checker: core.CollisionChecker, poses: FloatArray) -> bool:
+    """True if there are poses (N, 3), and none of them is blocked."""
+    return len(poses) > 0 and checker.first_blocked(poses) == len(poses)
+
+
+def way_around(
+    turning: Turning,
+    start: FloatArray,
+    end: FloatArray,
+    checker: core.CollisionChecker,
+    bounds: FloatArray,
+    most: float = math.inf,
+) -> FloatArray | None:
+    """(N, 3) poses of a clear way from start to end (3,), with both; None if none is found.
+
+    The shortest curve if that is clear, else a shortest path of such curves through free poses,
+    whose curves are checked only where a path would take them (Bohlin and Kavraki, "Path planning
+    using lazy PRM", ICRA 2000). The poses are the same in each call.
+
+    Args:
+        turning: how the body turns.
+        start: (3,).
+        end: (3,).
+        checker: of the body.
+        bounds: (4,) within which the poses are drawn [m].
+        most: greatest length [m].
+    """
+    if turning.length(start, end) > most:
+        return None
+    direct = turning.poses(start, end)
+    if is_clear(checker, direct):
+        return direct
+    if not (checker.is_free(start) and checker.is_free(end)):
+        return None
+    drawn = np.random.default_rng(0).uniform(
+        (bounds[0], bounds[1], -math.pi), (bounds[2], bounds[3], math.pi), (_VIAS, 3)
+    )
+    nodes = [start, end, *(pose for pose in drawn if checker.is_free(pose))]
+    return _Roadmap(turning, checker, nodes).path(most)
+
+
+class _Roadmap:
+    """Poses joined by curves; the first is the start, the second the end."""
+
+    def __init__(
+        self, turning: Turning, checker: core.CollisionChecker, nodes: list[FloatArray]
+    ) -> None:
+        self._turning = turning
+        self._checker = checker
+        self._nodes = nodes
+        count = len(nodes)
+        self._lengths = np.full((count, count), math.inf)
+        places = np.array(nodes)[:, :2]
+        for i in range(count):
+            if i == 1:
+                continue
+            away = np.hypot(*(places - places[i]).T)
+            near = set(np.argsort(away, kind="stable")[: _NEAREST + 1].tolist()) - {0, i} | {1}
+            if i == 0:
+                near = set(range(1, count))
+            for j in near:
+                self._lengths[i, j] = turning.length(nodes[i], nodes[j])
+        self._lengths[0, 1] = math.inf  # the direct curve is blocked
+        self._known: dict[tuple[int, int], FloatArray] = {}
+
+    def path(self, most: float) -> FloatArray | None:
+        """The shortest clear path, looked for until the shortest is clear or too long."""
+        from scipy.sparse.csgraph import dijkstra
+
+        while True:
+            costs, before = dijkstra(self._lengths, indices=0, return_predecessors=True)
+            if not costs[1] <= most or math.isinf(costs[1]):
+                return None
+            chain = [1]
+            while chain[-1] != 0:
+                chain.append(int(before[chain[-1]]))
+            chain.reverse()
+            edges = list(zip(chain, chain[1:], strict=False))
+            blocked = [edge for edge in edges if not self._is_clear(edge)]
+            if not blocked:
+                parts = [self._known[edge] for edge in edges]
+                return np.vstack([parts[0], *(part[1:] for part in parts[1:])])
+            for edge in blocked:
+                self._lengths[edge] = math.inf
+
+    def _is_clear(self, edge: tuple[int, int]) -> bool:
+        if edge not in self._known:
+            i, j = edge
+            poses = self._turning.poses(self._nodes[i], self._nodes[j])
+            if not is_clear(self._checker, poses):
+                return False
+            self._known[edge] = poses
+        return True

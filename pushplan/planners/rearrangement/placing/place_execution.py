@@ -1,0 +1,204 @@
+"""`PlaceExecution`: one push to a place in hand: the way there, contact, the push, and backing off."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from pushplan.control import LegFollower, Legs, PoseFollower, StallChecker
+from pushplan.planners.rearrangement.placing.contact import ahead_of, compose, inverse
+from pushplan.planners.rearrangement.placing.curves import Turning
+from pushplan.planners.rearrangement.placing.place_order import PlaceChoice
+from pushplan.planners.pushing import PushingConfig, PushingMpc, PushParameters, PushPath
+from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
+from pushplan.world import RobotModel, Twist, World
+from pushplan.world.checks import FloatArray
+
+_ALIGNED = math.radians(0.4)  # error of a heading that is left where a push begins
+_PLACED = 0.004  # error of the place that is left there [circumscribed radii]
+_STEP = 0.12  # distance of poses on a straight way [circumscribed radii]
+_PRESS = 0.02  # by which the robot drives on into contact [circumscribed radii]
+_LOST_GAP = 0.25  # gap between bumper and object at which it is lost [circumscribed radii]
+_LOST_ASIDE = 1.2  # offset at which it is [half widths of the bumper]
+_LONGER = 1.3  # a curve from where contact was made is good that is longer by less
+
+Follower = Callable[[World, float], Twist | None]
+"""From the scene and for how long a command is held [s] to the velocity; None at the end."""
+
+
+class PlaceExecution:
+    """Carries out one push.
+
+    Args:
+        choice: the push and the way to it.
+        world: as it begins.
+        config: settings; ``mpc`` says by which controller the object is pushed.
+
+    Attributes:
+        pushing: the push itself has begun.
+        stuck: the robot did not get to its start.
+    """
+
+    def __init__(self, choice: PlaceChoice, world: World, config: RearrangementConfig) -> None:
+        self.push = choice.push
+        self.label = int(world.movables.ids[choice.push.k])
+        self._config = config
+        self._robot = world.robot
+        self._goal = choice.push.object_pose
+        self._stages: list[Callable[[World], Follower]] = [
+            lambda now: self._on_the_way(choice.way),
+            self._into_contact,
+            self._along_the_curve,
+            self._back,
+        ]
+        self._follower: Follower | None = None
+        self.pushing = False
+        self.stuck = False
+
+    def command(self, world: World, held: float) -> Twist | None:
+        """The velocity to drive now; None at the end.
+
+        Args:
+            world: the scene now.
+            held: for how long the command will be held [s].
+        """
+        while self._follower is not None or self._stages:
+            if self._follower is None:
+                self._follower = self._stages.pop(0)(world)
+                self.pushing = len(self._stages) == 1
+            twist = self._follower(world, held)
+            if twist is not None:
+                return twist
+            self._follower = None
+        return None
+
+    def _object(self, world: World) -> FloatArray | None:
+        """(3,) pose of the object; None if it has gone."""
+        found = np.flatnonzero(world.movables.ids == self.label)
+        return world.movables.poses[found[0]] if len(found) else None
+
+    def _on_the_way(self, way: Legs | FloatArray) -> Follower:
+        config = self._config
+        if not isinstance(way, Legs):
+            return self._through(way)
+        follower = LegFollower(
+            self._robot,
+            way,
+            near=_PLACED * self._robot.circumscribed_radius + config.position_noise,
+            aligned=_ALIGNED + config.heading_noise,
+            response=config.response,
+        )
+
+        def command(world: World, held: float) -> Twist | None:
+            twist = follower.command(world.robot_pose, world.time, held)
+            if twist is None and not follower.arrived:
+                self.stuck = True
+                self._stages.clear()
+            return twist
+
+        return command
+
+    def _into_contact(self, world: World) -> Follower:
+        there = self._object(world)
+        here = world.robot_pose
+        if there is None:
+            self._stages.clear()
+            return lambda world, held: None
+        contact = ahead_of(
+            self.push.contact.robot_at(there), _PRESS * self._robot.circumscribed_radius
+        )
+        return self._through(straight_poses(self._robot, here, contact))
+
+    def _along_the_curve(self, world: World) -> Follower:
+        there = self._object(world)
+        if there is None or self._is_lost(world, there):
+            return lambda world, held: None
+        poses = self._from_here(world.robot_pose, there)
+        if self._config.mpc:
+            return self._by_prediction(world, poses, there)
+        follow = self._through(poses)
+
+        def command(world: World, held: float) -> Twist | None:
+            there = self._object(world)
+            lost = there is None or self._is_lost(world, there)
+            return None if lost else follow(world, held)
+
+        return command
+
+    def _from_here(self, here: FloatArray, there: FloatArray) -> FloatArray:
+        """(N, 3) poses of the push from where contact was made, with the object as it lies."""
+        push = self.push
+        step = _STEP * self._robot.circumscribed_radius
+        turning = Turning(push.contact.radius, False, step)
+        seen = compose(inverse(here), there)
+        planned = push.contact.object_pose
+        seen[2] = planned[2] + math.remainder(seen[2] - planned[2], math.tau)
+        end = compose(self._goal, inverse(seen))
+        if not push.final:
+            end = ahead_of(here, push.length)
+        most = _LONGER * push.length + 2.0 * step
+        if turning.length(here, end) <= most:
+            return turning.poses(here, end)
+        return np.vstack([here, push.poses[1:]])
+
+    def _by_prediction(self, world: World, poses: FloatArray, there: FloatArray) -> Follower:
+        """Push by `PushingMpc` along the poses that the object has on the way."""
+        config = self._config
+        seen = compose(inverse(poses[0]), there)
+        path = np.array([compose(pose, seen) for pose in poses])
+        path[:, 2] = poses[:, 2]
+        plan = PushPath(path).plan(self._robot, self.label)
+        pusher = PushingMpc(
+            PushingConfig(
+                parameters=PushParameters(config.grip),
+                period=config.response,
+                heading=1.0,
+            )
+        )
+        pusher.reset(world)
+        stall = StallChecker(self._robot)
+
+        def command(world: World, held: float) -> Twist | None:
+            there = self._object(world)
+            if there is None or self._is_lost(world, there):
+                return None
+            if stall.update(world.robot_pose, world.time):
+                return None
+            twist = pusher.command(world, plan)
+            left = plan.length - pusher.along
+            if left < 1e-6:
+                return None
+            slower = min(1.0, left / max(twist.linear * held, 1e-9))
+            twist = Twist(slower * twist.linear, slower * twist.angular)
+            stall.send(twist)
+            return twist
+
+        return command
+
+    def _is_lost(self, world: World, there: FloatArray) -> bool:
+        """True if an object at a pose (3,) is not before the bumper."""
+        model = self.push.contact.model
+        x, y, _ = compose(inverse(world.robot_pose), there).tolist()
+        gap = x - model.reach
+        wide = abs(y) > _LOST_ASIDE * model.bumper.half
+        return wide or gap > _LOST_GAP * self._robot.circumscribed_radius
+
+    def _back(self, world: World) -> Follower:
+        push = self.push
+        off = float(np.hypot(*(push.end - push.poses[-1])[:2]))
+        here = world.robot_pose
+        return self._through(straight_poses(self._robot, here, ahead_of(here, -off)))
+
+    def _through(self, poses: FloatArray) -> Follower:
+        follower = PoseFollower(self._robot, poses, self._config.response)
+        return lambda world, held: follower.command(world.robot_pose, world.time, held)
+
+
+def straight_poses(robot: RobotModel, start: FloatArray, end: FloatArray) -> FloatArray:
+    """(N, 3) poses between two (3,), the headings the shorter way."""
+    end = np.append(end[:2], start[2] + math.remainder(end[2] - start[2], math.tau))
+    step = _STEP * robot.circumscribed_radius
+    count = max(2, math.ceil(math.dist(start[:2], end[:2]) / step))
+    return np.linspace(start, end, count + 1)

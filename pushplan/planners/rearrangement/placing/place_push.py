@@ -1,0 +1,409 @@
+"""`PlacePush`: one push of one object, and the pushes that may be made in a scene."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from pushplan.core import motion as core
+from pushplan.motion.collision import obstacles
+from pushplan.planners.rearrangement.placing.contact import Contact, ahead_of
+from pushplan.planners.rearrangement.placing.curves import is_clear, way_around
+from pushplan.planners.rearrangement.placing.placing_scene import PlacingScene
+from pushplan.world.checks import FloatArray
+from pushplan.world.outline import transform
+
+# All lengths in circumscribed radii.
+_LENGTHS = (0.85, 1.8, 3.2, 5.0, 7.5)  # of straight pushes
+_AGAIN = 3.5  # cost of one more push
+_LONGEST = 60.0  # push that is looked at
+_PER_OBJECT = 4  # free pushes of an object that are kept
+_LOOKED_AT = 40  # pushes of an object that are checked for them
+_FAILED = 3.5  # cost of a push for each time that it has failed
+_MOST_FAILURES = 3  # after so many it waits until another push has succeeded
+_WAITS = 6  # for so many others an object is in the way that has just made room
+_IN_THE_WAY = 9.0  # cost of an end on the place of another object, or in its way
+_SHOVES = 28.0  # cost of a push that carries other objects along
+_SPACE = 1.1  # distance from other objects that is worth something
+_SPACE_COST = 7.0  # cost where there is none of it
+_DONE = 7.0  # cost of moving an object that is done
+_AROUND = 3  # pairs of face and heading for which ways around are looked for
+_CLOSE_ENOUGH = (0.6, 0.8)  # errors of place and heading, in tolerances, that need no next push
+
+
+class Part(NamedTuple):
+    """Robot and object on a part of the object's way."""
+
+    contact: Contact
+    poses: FloatArray  # (N, 3) of the robot
+
+
+@dataclass(frozen=True, eq=False)
+class PlacePush:
+    """A push of one object by one face, along a curve that it can follow without slipping.
+
+    Args:
+        k: index of the object.
+        way: the push, and the one after it where that does not end at the object's place.
+        length: of the push [m].
+        rest: cost of bringing the object to its place from there [m]; 0 where the push does.
+        penalty: further cost [m].
+        early: cost of beginning with it, because the object's place is in the way of others [m].
+        free: nothing is in the way.
+        favours: index of the object for which it makes room; -1 if none.
+        start: (3,) the robot before contact.
+        end: (3,) the robot once it has backed off.
+    """
+
+    k: int
+    way: tuple[Part, ...]
+    length: float
+    rest: float
+    penalty: float
+    free: bool
+    start: FloatArray
+    end: FloatArray
+    early: float = 0.0
+    favours: int = -1
+
+    @property
+    def contact(self) -> Contact:
+        """By which the object is pushed."""
+        return self.way[0].contact
+
+    @property
+    def poses(self) -> FloatArray:
+        """(N, 3) of the robot, from contact on."""
+        return self.way[0].poses
+
+    @property
+    def final(self) -> bool:
+        """The object is at its place after it."""
+        return self.rest == 0.0
+
+    @property
+    def cost(self) -> float:
+        """[m]."""
+        return self.length + self.rest + self.penalty
+
+    @property
+    def object_pose(self) -> FloatArray:
+        """(3,) the object after the push."""
+        return self.contact.object_at(self.poses[-1])
+
+
+@dataclass
+class PlacingHistory:
+    """Record of what has been tried.
+
+    Args:
+        failures: pushes that did not do what they were for, by object, face and purpose.
+        waits: by the id of an object that has made room, the id of that for which it did.
+    """
+
+    failures: Counter[tuple[int, float, bool]] = field(default_factory=Counter)
+    waits: dict[int, int] = field(default_factory=dict)
+
+    def count(self, scene: PlacingScene, push: PlacePush) -> None:
+        """A push has failed, or was not the last one of its object."""
+        self.failures[self._key(scene, push.k, push.contact, push.final)] += 1
+
+    def cost(self, scene: PlacingScene, k: int, contact: Contact, final: bool) -> float:
+        """What to add to the cost of a push [m]; inf if it has been tried too often."""
+        count = self.failures[self._key(scene, k, contact, final)]
+        return _FAILED * scene.size * count if count < _MOST_FAILURES else math.inf
+
+    def waits_for(self, scene: PlacingScene, k: int) -> bool:
+        """True if object ``k`` has made room for one that is not at its place yet."""
+        other = self.waits.get(int(scene.movables.ids[k]))
+        return other in scene.movables.ids[scene.left].tolist()
+
+    @staticmethod
+    def _key(
+        scene: PlacingScene, k: int, contact: Contact, final: bool
+    ) -> tuple[int, float, bool]:
+        return int(scene.movables.ids[k]), round(contact.model.face.normal, 3), final
+
+
+class _Option(NamedTuple):
+    """A push that may be made, not checked yet; poses are those of the robot."""
+
+    bound: float  # least cost [m]
+    contact: Contact
+    start: FloatArray
+    target: FloatArray
+    length: float
+    following: tuple[tuple[float, Contact, FloatArray, FloatArray], ...]  # the next push, sorted
+    penalty: float
+
+
+class PlacePushes:
+    """The pushes of a scene.
+
+    Args:
+        scene: the scene.
+        history: of what was tried.
+    """
+
+    def __init__(self, scene: PlacingScene, history: PlacingHistory) -> None:
+        self._scene = scene
+        self._history = history
+        self._checkers: dict[tuple[int, int, bool], core.CollisionChecker] = {}
+        self._blocked: dict[int, PlacePush] = {}
+
+    def towards_places(self) -> list[PlacePush]:
+        """Pushes of the objects that are left, along a curve or straight on.
+
+        Straight pushes are followed by others: they bring an object to where the curve to its place
+        is clear (pre-relocation, Talia et al., "ReloPush", ICRA 2025), or mend what the last push
+        has missed.
+        """
+        found = {k: self._of_object(k) for k in self._scene.left}
+        best = {
+            k: min(own, key=lambda push: push.cost) for k, own in found.items() if own
+        } | self._blocked
+        pushes = list(self._blocked.values())
+        for k, own in found.items():
+            place = self._scene.goal.poses[self._scene.places[k]]
+            others = [push for j, push in best.items() if j != k]
+            at_place = self._blocks(k, place, others)
+            waits = _WAITS * self._history.waits_for(self._scene, k)
+            for push in own:
+                early = at_place + waits
+                if not push.final:
+                    early = max(early, self._blocks(k, push.object_pose, others))
+                pushes.append(replace(push, early=early * _IN_THE_WAY * self._scene.size))
+        return pushes
+
+    def _blocks(self, k: int, pose: FloatArray, pushes: list[PlacePush]) -> int:
+        """How many of the pushes object ``k`` would block at a pose (3,)."""
+        return sum(not self._is_clear_of(push, k, pose) for push in pushes)
+
+    def _is_clear_of(self, push: PlacePush, k: int, pose: FloatArray) -> bool:
+        """True if a push and the next are clear of object ``k`` at a pose (3,)."""
+        scene = self._scene
+        there = obstacles(
+            scene.empty, [transform(pose, part) for part in scene.movables.parts(k)]
+        )
+        return all(
+            is_clear(core.CollisionChecker(part.contact.wide, there), part.poses)
+            for part in push.way
+        ) and all(
+            core.CollisionChecker(scene.alone_body, there).is_free(off)
+            for off in (push.start, push.end)
+        )
+
+    def _of_object(self, k: int) -> list[PlacePush]:
+        """The cheapest free pushes; the cheapest one that others block is kept for later."""
+        kept: list[PlacePush] = []
+        options = [option for option in self._options(k) if math.isfinite(option.bound)]
+        options.sort(key=lambda option: option.bound)
+        for option in options[:_LOOKED_AT]:
+            push = self._checked(k, option)
+            if push is None:
+                continue
+            if push.free:
+                kept.append(push)
+            elif k not in self._blocked:
+                self._blocked[k] = push
+            if len(kept) >= _PER_OBJECT:
+                break
+        if not any(push.final for push in kept):
+            kept += self._around(k)
+        if kept:
+            self._blocked.pop(k, None)
+        return kept
+
+    def _options(self, k: int) -> Iterator[_Option]:
+        scene = self._scene
+        size = scene.size
+        here = scene.poses[k]
+        goals = scene.goal_poses(k)
+        ends = [(contact, contact.robot_at(goal)) for contact in scene.contacts[k] for goal in goals]
+        for contact in scene.contacts[k]:
+            start = contact.robot_at(here)
+            turning = scene.pushes(contact)
+            failed = self._history.cost(scene, k, contact, True)
+            for other, end in ends:
+                if other is contact:
+                    length = turning.length(start, end)
+                    if length < _LONGEST * size:
+                        yield _Option(length + failed, contact, start, end, length, (), failed)
+            failed = self._history.cost(scene, k, contact, False)
+            heading = np.array([math.cos(start[2]), math.sin(start[2])])
+            along = float((goals[0][:2] - here[:2]) @ heading)
+            lengths = {length * size for length in _LENGTHS}
+            if along > 0.02 * size:
+                lengths.add(along)
+            for length in sorted(lengths):
+                target = ahead_of(start, length)
+                there = contact.object_at(target)
+                if self._is_close(k, there):
+                    yield _Option(length + failed, contact, start, target, length, (), failed)
+                    continue
+                begins = {id(other): other.robot_at(there) for other in scene.contacts[k]}
+                following = sorted(
+                    (
+                        (scene.pushes(other).length(begins[id(other)], end), n)
+                        for n, (other, end) in enumerate(ends)
+                    )
+                )
+                nexts = tuple(
+                    (more, ends[n][0], begins[id(ends[n][0])], ends[n][1])
+                    for more, n in following[:6]
+                    if more < _LONGEST * size
+                )
+                if nexts:
+                    bound = length + failed + nexts[0][0] + _AGAIN * size
+                    yield _Option(bound, contact, start, target, length, nexts, failed)
+
+    def _checked(self, k: int, option: _Option) -> PlacePush | None:
+        """The push, unless something static is in its way, or in that of the next."""
+        scene = self._scene
+        poses = scene.pushes(option.contact).poses(option.start, option.target)
+        first = self._part(k, option.contact, poses)
+        if first is None:
+            return None
+        free, way = first
+        rest = 0.0
+        if option.following:
+            nexts = (
+                (length, self._part(k, contact, scene.pushes(contact).poses(start, end)))
+                for length, contact, start, end in option.following
+            )
+            found = [(not then[0], length, then[1]) for length, then in nexts if then is not None]
+            if not found:
+                return None
+            blocked, length, then = min(found, key=lambda one: one[:2])
+            free = free and not blocked
+            rest = length + _AGAIN * scene.size
+            way = (*way, *then)
+        return self._push(k, way, option.length, rest, option.penalty, free)
+
+    def _push(
+        self, k: int, way: tuple[Part, ...], length: float, rest: float, penalty: float, free: bool
+    ) -> PlacePush:
+        scene = self._scene
+        contact, poses = way[0]
+        start = scene.backed_off(k, poses[0], contact)
+        end = scene.backed_off(k, poses[-1], contact)
+        return PlacePush(k, way, length, rest, penalty, free, start, end)
+
+    def _part(
+        self, k: int, contact: Contact, poses: FloatArray
+    ) -> tuple[bool, tuple[Part, ...]] | None:
+        """Whether no object is in the way of a push, and the push; None if a wall is."""
+        scene = self._scene
+        if not is_clear(self._checker(k, contact, False), poses):
+            return None
+        offs = [scene.backed_off(k, pose, contact) for pose in (poses[0], poses[-1])]
+        if not all(map(scene.at_walls.is_free, offs)):
+            return None
+        free = all(map(scene.alone(k).is_free, offs))
+        free = free and is_clear(self._checker(k, contact, True), poses)
+        return free, (Part(contact, poses),)
+
+    def _around(self, k: int) -> list[PlacePush]:
+        """The push to its place around what is in the way, if one is found."""
+        scene = self._scene
+        here = scene.poses[k]
+        pairs = sorted(
+            (scene.pushes(contact).length(contact.robot_at(here), contact.robot_at(goal)), i, j)
+            for i, contact in enumerate(scene.contacts[k])
+            for j, goal in enumerate(scene.goal_poses(k))
+        )
+        tried = 0
+        for length, i, j in pairs:
+            contact = scene.contacts[k][i]
+            start = contact.robot_at(here)
+            target = contact.robot_at(scene.goal_poses(k)[j])
+            offs = [scene.backed_off(k, pose, contact) for pose in (start, target)]
+            failed = self._history.cost(scene, k, contact, True)
+            if math.isinf(failed) or not all(map(scene.alone(k).is_free, offs)):
+                continue
+            tried += 1
+            most = min(_LONGEST * scene.size, 3.0 * length + 10.0 * scene.size)
+            checker = self._checker(k, contact, True)
+            bounds = scene.world.static.bounds
+            poses = way_around(scene.pushes(contact), start, target, checker, bounds, most)
+            if poses is not None:
+                long = float(np.hypot(*np.diff(poses[:, :2], axis=0).T).sum())
+                return [self._push(k, (Part(contact, poses),), long, 0.0, failed, True)]
+            if tried == _AROUND:
+                break
+        return []
+
+    def _checker(self, k: int, contact: Contact, others: bool) -> core.CollisionChecker:
+        """Checks robot and object together, among what is static or all but the object."""
+        key = k, id(contact), others
+        if key not in self._checkers:
+            body = contact.wide if others else contact.body
+            among = self._scene.among(k) if others else self._scene.walls
+            self._checkers[key] = core.CollisionChecker(body, among)
+        return self._checkers[key]
+
+    def _is_close(self, k: int, pose: FloatArray) -> bool:
+        """True if an object at a pose (3,) is well within its tolerances."""
+        goal = self._scene.goal
+        place = int(self._scene.places[k])
+        distances, turns = goal.errors(pose[None])
+        near, aligned = _CLOSE_ENOUGH
+        return bool(
+            distances[place] < near * goal.radii[place]
+            and turns[place] < aligned * goal.heading_tolerances[place]
+        )
+
+    def making_room(self) -> list[PlacePush]:
+        """Straight pushes of objects that are in the way of others, out of it."""
+        found = []
+        for push in self._blocked.values():
+            for k in range(len(self._scene.movables)):
+                if k != push.k and not self._is_clear_of(push, k, self._scene.poses[k]):
+                    found += [
+                        replace(move, favours=push.k)
+                        for move in self._moves(k)
+                        if self._is_clear_of(push, k, move.object_pose)
+                    ]
+        return found
+
+    def shoves(self) -> list[PlacePush]:
+        """Straight pushes of any object, whatever they carry along."""
+        found = []
+        for k in range(len(self._scene.movables)):
+            found += self._moves(k, shoves=True)
+        return found
+
+    def _moves(self, k: int, shoves: bool = False) -> Iterator[PlacePush]:
+        """Straight pushes of an object to anywhere where there is room."""
+        scene = self._scene
+        size = scene.size
+        others = [shape for j, shape in enumerate(scene.shapes) if j != k]
+        for contact in scene.contacts[k]:
+            start = contact.robot_at(scene.poses[k])
+            if not scene.alone(k).is_free(scene.backed_off(k, start, contact)):
+                continue
+            for length in _LENGTHS:
+                poses = scene.pushes(contact).poses(start, ahead_of(start, length * size))
+                part = self._part(k, contact, poses)
+                if part is None or not (part[0] or shoves):
+                    continue
+                free, way = part
+                shape = scene.shape_at(k, contact.object_at(poses[-1]))
+                space = min((shape.distance(other) for other in others), default=math.inf)
+                cost = _SPACE_COST * max(0.0, 1.0 - space / (_SPACE * size))
+                if not free:
+                    cost += _SHOVES
+                if scene.done[k]:
+                    cost += _DONE
+                wanted = scene.wanted_shapes.items()
+                if any(j != k and shape.distance(s) < 0.2 * size for j, s in wanted):
+                    cost += _IN_THE_WAY
+                penalty = cost * size + self._history.cost(scene, k, contact, False)
+                if math.isinf(penalty):
+                    continue
+                yield self._push(k, way, length * size, _AGAIN * size, penalty, True)

@@ -1,0 +1,117 @@
+"""`Placer`: pushes every object to its place, one decision after the other."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pushplan.control import ImmediateExecutor, Recovery
+from pushplan.planners.rearrangement.placing.place_execution import PlaceExecution
+from pushplan.planners.rearrangement.placing.place_order import PlaceChoice, first_push
+from pushplan.planners.rearrangement.placing.place_push import PlacePush, PlacePushes, PlacingHistory
+from pushplan.planners.rearrangement.placing.placing_scene import PlacingScene
+from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
+from pushplan.world import PendingResult, PlanningExecutor, Stop, Twist, World
+
+_MOST_ENDS = 3  # pushes and recoveries that may end in one step until the robot waits
+_RETREAT = 0.3  # distance that the robot backs off where it is stuck [circumscribed radii]
+_WAIT = 1.0  # time after which it looks again where there is no push [s]
+
+
+class Placer:
+    """Decides which object to push next, and by which push; drives it, and decides anew.
+
+    Args:
+        config: settings.
+        stop: stop rule of each decision.
+    """
+
+    def __init__(self, config: RearrangementConfig, stop: Stop | None) -> None:
+        self._config = config
+        self._stop = stop
+        self.executor: PlanningExecutor = ImmediateExecutor()
+        self._call: PendingResult[PlaceChoice | None] | None = None
+        self._execution: PlaceExecution | None = None
+        self._history = PlacingHistory()
+        self._rng = np.random.default_rng(0)
+        self._look_at = -math.inf
+        self.order: tuple[PlacePush, ...] = ()
+        self._recovery: Recovery | None = None
+        self._retreats = 0
+        self.pushes = 0
+
+    def command(self, world: World, held: float) -> Twist:
+        """The velocity to drive now.
+
+        Args:
+            world: the scene now.
+            held: for how long the command will be held [s].
+        """
+        for _ in range(_MOST_ENDS):
+            if self._recovery is not None:
+                twist = self._recovery.command(world, held)
+                if twist is not None:
+                    return twist
+                self._recovery = None
+            if self._execution is not None:
+                twist = self._execution.command(world, held)
+                if twist is not None:
+                    return twist
+                self._close(world, self._execution)
+            if world.completed.all() or world.time < self._look_at or not self._choose(world):
+                break
+        return Twist(0.0, 0.0)
+
+    def abandon(self) -> None:
+        """Wait no longer for a decision."""
+        if self._call is not None:
+            self._call.abandon()
+
+    def _choose(self, world: World) -> bool:
+        """Begin with a push; False if there is none, or it is not chosen yet."""
+        if self._call is None:
+            scene = PlacingScene(world, self._config.grip)
+            self._call = self.executor.submit(
+                lambda stop: self._best(scene), world.time, self._stop
+            )
+        if not self._call.ready(world.time):
+            return False
+        choice = self._call.result()
+        self._call = None
+        if choice is None:
+            self._history.failures.clear()
+            self._look_at = world.time + _WAIT
+            return False
+        self.order = choice.order
+        ids = world.movables.ids
+        if choice.push.favours >= 0:
+            self._history.waits[int(ids[choice.push.k])] = int(ids[choice.push.favours])
+        self.pushes += 1
+        self._execution = PlaceExecution(choice, world, self._config)
+        return True
+
+    def _best(self, scene: PlacingScene) -> PlaceChoice | None:
+        pushes = PlacePushes(scene, self._history)
+        for options in (pushes.towards_places, pushes.making_room, pushes.shoves):
+            choice = first_push(scene, options(), self._config.order, self._rng)
+            if choice is not None:
+                return choice
+        return None
+
+    def _close(self, world: World, execution: PlaceExecution) -> None:
+        """Note whether the push has brought its object home."""
+        self._execution = None
+        scene = PlacingScene(world, self._config.grip)
+        push = execution.push
+        if scene.done[push.k]:
+            self._history.failures.clear()
+            self._retreats = 0
+        else:
+            self._history.count(scene, push)
+        if execution.stuck:
+            distance = _RETREAT * scene.size
+            self._recovery = Recovery(
+                world, distance, skip=self._retreats, looks=False, searches=False
+            )
+            self._retreats += 1

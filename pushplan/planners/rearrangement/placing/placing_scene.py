@@ -1,0 +1,163 @@
+"""`PlacingScene`: one snapshot, with what pushes to places need to know of it."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+
+import numpy as np
+import shapely
+
+from pushplan.core import motion as core
+from pushplan.geometry import VisibilityGraph
+from pushplan.motion.collision import footprint, obstacles
+from pushplan.planners.rearrangement.placing.contact import Contact, ahead_of, contacts_of
+from pushplan.planners.rearrangement.placing.curves import Turning
+from pushplan.world import Drive, ObjectGoals, StaticMap, World
+from pushplan.world.checks import BoolArray, FloatArray, IntArray
+from pushplan.world.outline import transform
+
+_STEP = 0.12  # distance of the poses along a push [circumscribed radii]
+_HEADINGS = 8  # of an object that may have any
+_TURNING_ROOM = 0.09  # between object and a robot that turns in front of it [circumscribed radii]
+_OFF = 0.35  # distance by which a car is off an object before it steers [circumscribed radii]
+_STEERING = 1.1  # turning radius that a car plans with, over its least
+
+
+class PlacingScene:
+    """A world whose goal is one of objects, each with a place.
+
+    Args:
+        world: the snapshot, with a goal of `ObjectGoals`.
+        friction: Coulomb coefficient between robot and objects.
+    """
+
+    def __init__(self, world: World, friction: float) -> None:
+        goal = world.goal
+        assert isinstance(goal, ObjectGoals)
+        self.world = world
+        self.goal = goal
+        self.robot = world.robot
+        self.movables = world.movables
+        self.size = world.robot.circumscribed_radius
+        self.friction = friction
+        self.poses: FloatArray = world.movables.poses
+        self.walls = obstacles(world.static)
+        self._bodies: dict[int, tuple[core.ConvexObstacles, core.CollisionChecker]] = {}
+
+    @cached_property
+    def places(self) -> IntArray:
+        """(K,) the place of each object by its number in the goal, -1 for those without one."""
+        return self.goal.assigned(self.movables.ids, self.poses)
+
+    @cached_property
+    def done(self) -> BoolArray:
+        """(K,) which objects are where they should be."""
+        return self.goal.reached(self.movables.ids, self.poses)
+
+    @property
+    def left(self) -> list[int]:
+        """Indices of the objects that are not at their places."""
+        found: list[int] = np.flatnonzero(~self.done).tolist()
+        return found
+
+    @cached_property
+    def contacts(self) -> tuple[tuple[Contact, ...], ...]:
+        """The contacts of each object."""
+        count = len(self.movables)
+        return tuple(
+            contacts_of(self.robot, self.movables, k, self.friction) for k in range(count)
+        )
+
+    @cached_property
+    def is_car(self) -> bool:
+        """True if the robot cannot turn on the spot."""
+        return self.robot.drive is Drive.CAR
+
+    @cached_property
+    def drives(self) -> Turning:
+        """How the robot turns between pushes, if it is a car."""
+        radius = _STEERING * self.robot.min_turning_radius
+        return Turning(radius, True, _STEP * self.size)
+
+    def pushes(self, contact: Contact) -> Turning:
+        """How robot and object turn together."""
+        return Turning(contact.radius, False, _STEP * self.size)
+
+    def goal_poses(self, k: int) -> list[FloatArray]:
+        """Poses (3,) at which object ``k`` is at its place."""
+        place = int(self.places[k])
+        pose = self.goal.poses[place]
+        count = int(self.goal.symmetries[place])
+        if self.goal.heading_tolerances[place] >= math.pi:
+            count = max(count, _HEADINGS)
+        return [pose + np.array([0.0, 0.0, math.tau * i / count]) for i in range(count)]
+
+    def backed_off(self, k: int, pose: FloatArray, contact: Contact) -> FloatArray:
+        """(3,) where the robot is once it has backed off object ``k`` from a pose (3,)."""
+        if self.is_car:
+            return ahead_of(pose, -_OFF * self.size)
+        radius = float(self.movables.radii[k])
+        depth = contact.model.face.depth
+        front = contact.model.bumper.front
+        off = self.size + radius + _TURNING_ROOM * self.size - front - depth
+        return ahead_of(pose, -max(off, _OFF * self.size))
+
+    def among(self, k: int) -> core.ConvexObstacles:
+        """Everything static, and all objects but ``k``; all if it is -1."""
+        return self._others(k)[0]
+
+    def alone(self, k: int) -> core.CollisionChecker:
+        """Checks the robot alone, in `among`."""
+        return self._others(k)[1]
+
+    def _others(self, k: int) -> tuple[core.ConvexObstacles, core.CollisionChecker]:
+        if k not in self._bodies:
+            others = [
+                part
+                for j in range(len(self.movables))
+                if j != k
+                for part in self.movables.parts_world(j)
+            ]
+            among = obstacles(self.world.static, others)
+            self._bodies[k] = among, core.CollisionChecker(footprint(self.robot), among)
+        return self._bodies[k]
+
+    @cached_property
+    def alone_body(self) -> core.Footprint:
+        """The robot."""
+        return footprint(self.robot)
+
+    @cached_property
+    def empty(self) -> StaticMap:
+        """The bounds of the map, with nothing in it."""
+        return StaticMap.build((), bounds=self.world.static.bounds)
+
+    @cached_property
+    def at_walls(self) -> core.CollisionChecker:
+        """Checks the robot alone among what is static."""
+        return core.CollisionChecker(footprint(self.robot), self.walls)
+
+    @cached_property
+    def shapes(self) -> list[shapely.Geometry]:
+        """The objects."""
+        return [self.shape_at(k, self.poses[k]) for k in range(len(self.movables))]
+
+    @cached_property
+    def wanted_shapes(self) -> dict[int, shapely.Geometry]:
+        """By index: the objects that are left, at their places."""
+        return {k: self.shape_at(k, self.goal.poses[self.places[k]]) for k in self.left}
+
+    def shape_at(self, k: int, pose: FloatArray) -> shapely.Geometry:
+        """Object ``k`` at a pose (3,)."""
+        parts = [shapely.Polygon(transform(pose, part)) for part in self.movables.parts(k)]
+        return shapely.union_all(parts)
+
+    def graph(self, clearance: float) -> VisibilityGraph:
+        """Ways of a disc around everything, static or not."""
+        static = self.world.static
+        parts = [p for j in range(len(self.movables)) for p in self.movables.parts_world(j)]
+        solid = StaticMap(
+            (*static.polygons, *parts), static.segments, static.radii, static.bounds
+        )
+        return VisibilityGraph(solid, clearance)
