@@ -64,6 +64,7 @@ class Metric:
 
 _NAVIGATION = "pushplan.metrics.navigation"
 _MANIPULATION = "pushplan.metrics.manipulation"
+_PUSHES = "pushplan.metrics.pushes"
 _FACTS = "pushplan.metrics.lengths"
 
 _METRICS: dict[str, Metric] = {
@@ -88,6 +89,15 @@ _METRICS: dict[str, Metric] = {
     "heading_error_rad": Metric(
         f"{_MANIPULATION}:heading_error", Role.ON_REQUEST, higher_is_better=False, goal="objects"
     ),
+    **{
+        name: Metric(
+            f"{_PUSHES}:{name}",
+            Role.ON_REQUEST,
+            higher_is_better=None if name == "pushing_distance_m" else False,
+            goal="objects",
+        )
+        for name in ("pushes", "relocations", "pushing_distance_m", "transit_distance_m")
+    },
     "made_unsolvable": Metric(
         "pushplan.metrics.closing:made_unsolvable",
         Role.ON_REQUEST,
