@@ -106,7 +106,11 @@ def _execute(job: Job, settings: JobSettings) -> JobResult:
     except UnusablePolicyError as error:
         return failed_result(job, Status.POLICY_ERROR, str(error), traceback.format_exc())
     recording = Recording(
-        policy, job.scenario, job.policy.label, latency_factor=settings.latency_factor
+        policy,
+        job.scenario,
+        job.policy.label,
+        latency_factor=settings.latency_factor,
+        clock=time.process_time if settings.clock == "cpu" else time.perf_counter,
     )
     begin = time.perf_counter()
     began = instant()

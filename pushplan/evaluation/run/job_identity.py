@@ -120,6 +120,8 @@ def settings_dict(settings: JobSettings) -> dict[str, Any]:
         "observation": settings.observation,
         "timeout_s": settings.timeout_s,
         "latency_factor": settings.latency_factor,
+        # left out by default, as jobs of older runs do not name it
+        **({"clock": settings.clock} if settings.clock != "wall" else {}),
     }
 
 
