@@ -220,10 +220,7 @@ def _reference_ends(goal: AreaGoal | GoalDisc) -> FloatArray:
 
 
 def place_errors(episode: Episode) -> tuple[FloatArray, FloatArray]:
-    """Distances [m] and turns [rad], up to symmetry, of objects from their places at the end.
-
-    (N,) each, for the objects that have a place; none for goals of other kinds.
-    """
+    """Distances [m] and least turns [rad] at the end of the (N,) objects that have places."""
     goal = episode.world.goal
     if not isinstance(goal, ObjectGoals):
         return np.zeros(0), np.zeros(0)

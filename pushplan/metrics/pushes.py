@@ -62,7 +62,7 @@ def pushing(episode: Episode) -> Pushing:
         there = [bool(episode.world_at(last + 1).completed[k]) for _, last in spans]
         there[-1] |= bool(episode.completed[k])  # the task may be less strict than the goal
         pushes += len(spans)
-        relocations += len(spans) - (sum(there) if wanted[k] else 0)
+        relocations += len(spans) - int(wanted[k]) * sum(there)
     return Pushing(pushes, relocations, float(driven[busy].sum()), float(driven[~busy].sum()))
 
 
@@ -76,22 +76,18 @@ def _pushed(episode: Episode) -> BoolArray:
     gap = _TOUCH * robot.circumscribed_radius
     for k in range(len(objects)):
         at = np.flatnonzero(pushed[:, k])
-        instants = np.union1d(at, at + 1)
         away = np.full(len(episode.times), np.inf)
-        offsets = poses[instants, k, :2] - episode.robot_poses[instants, :2]
-        near = np.hypot(*offsets.T) <= robot.circumscribed_radius + objects.radii[k] + gap
-        instants = instants[near]
-        shapes = _shapes(episode.robot_poses[instants], robot.contact_parts)
-        away[instants] = shapely.distance(shapes, _shapes(poses[instants, k], objects.parts(k)))
+        seen = np.union1d(at, at + 1)
+        pushers = _shapes(episode.robot_poses[seen], robot.contact_parts)
+        away[seen] = shapely.distance(pushers, _shapes(poses[seen, k], objects.parts(k)))
         pushed[at, k] = np.minimum(away[at], away[at + 1]) <= gap
     return pushed
 
 
 def _shapes(poses: FloatArray, parts: ConvexParts) -> Any:
     """(N,) unions of parts in the frame of a body, at its (N, 3) poses."""
-    c = np.cos(poses[:, 2])
-    s = np.sin(poses[:, 2])
-    turns = np.array([[c, s], [-s, c]]).transpose(2, 0, 1)  # (N, 2, 2), for rows
+    ahead = np.array([np.cos(poses[:, 2]), np.sin(poses[:, 2])])
+    turns = np.array([ahead, [-ahead[1], ahead[0]]]).transpose(2, 0, 1)  # (N, 2, 2), for rows
     each = [shapely.polygons(part @ turns + poses[:, None, :2]) for part in parts]
     return shapely.multipolygons(np.column_stack(each))
 
@@ -103,8 +99,7 @@ def _spans(pushed: BoolArray, k: int, times: FloatArray) -> list[tuple[int, int]
     before = np.concatenate([[0], np.cumsum(elsewhere)])  # steps for other objects so far
     off = times[at[1:]] - times[at[:-1] + 1] > _PAUSE_S
     another = before[at[1:]] > before[at[:-1]]
-    spans = np.split(at, np.flatnonzero(off | another) + 1)
-    return [(int(span[0]), int(span[-1])) for span in spans]
+    return [(one[0], one[-1]) for one in np.split(at, np.flatnonzero(off | another) + 1)]
 
 
 def pushes(episode: Episode) -> float:

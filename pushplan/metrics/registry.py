@@ -90,14 +90,12 @@ _METRICS: dict[str, Metric] = {
         f"{_MANIPULATION}:heading_error", Role.ON_REQUEST, higher_is_better=False, goal="objects"
     ),
     **{
-        name: Metric(
-            f"{_PUSHES}:{name}",
-            Role.ON_REQUEST,
-            higher_is_better=None if name == "pushing_distance_m" else False,
-            goal="objects",
-        )
-        for name in ("pushes", "relocations", "pushing_distance_m", "transit_distance_m")
+        name: Metric(f"{_PUSHES}:{name}", Role.ON_REQUEST, higher_is_better=False, goal="objects")
+        for name in ("pushes", "relocations", "transit_distance_m")
     },
+    "pushing_distance_m": Metric(
+        f"{_PUSHES}:pushing_distance_m", Role.ON_REQUEST, higher_is_better=None, goal="objects"
+    ),
     "made_unsolvable": Metric(
         "pushplan.metrics.closing:made_unsolvable",
         Role.ON_REQUEST,

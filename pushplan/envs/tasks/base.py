@@ -147,7 +147,7 @@ class Task(ABC):
         others = () if solid else sorted(robots().keys() - ROBOTS)
         try:
             choice("robot", name, (*preset.robots, *others))
-            usual = preset.bumper_of(name)
+            usual = preset.robots.get(name, {}).get("bumper", preset.bumper)
             if usual is None and bumper not in (None, "none"):
                 raise InvalidInputError(
                     f"bumper {bumper!r} does not fit the robot of this preset: it has none, or "

@@ -24,20 +24,12 @@ class Preset(SimpleNamespace):
     def robot(self, name: str, drive: Drive, **options: Any) -> RobotModel:
         """One of the ``robots`` of the file, with further options of its maker.
 
-        Args:
-            name: of the robot.
-            drive: unless the file gives it one of its own.
-            options: of the maker.
+        The drive counts unless the file gives the robot one of its own.
         """
         entry = {"drive": drive, **self.robots[name]}
         entry.pop("bumper", None)
         robot: RobotModel = resolve_name(entry.pop("make"))(**entry, **options)
         return robot
-
-    def bumper_of(self, name: str) -> str | None:
-        """The usual bumper of a robot; None where it cannot be changed."""
-        usual: str | None = self.robots.get(name, {}).get("bumper", self.bumper)
-        return usual
 
 
 @cache

@@ -47,6 +47,7 @@ from pushplan.world.policy_abilities import (
 )
 
 DRY_RUN_STEPS = 2
+_CLOCKS = {"wall": time.perf_counter, "cpu": time.process_time}
 _ABILITIES = (
     *(ChecksEnvironment, ChoosesActions, ChoosesObservation, HoldsDecisions, LogsPlans),
     *(PlansBesideDriving, ShowsPlan),
@@ -110,7 +111,7 @@ def _execute(job: Job, settings: JobSettings) -> JobResult:
         job.scenario,
         job.policy.label,
         latency_factor=settings.latency_factor,
-        clock=time.process_time if settings.clock == "cpu" else time.perf_counter,
+        clock=_CLOCKS[settings.clock],
     )
     begin = time.perf_counter()
     began = instant()
