@@ -47,7 +47,7 @@ ORDERS = ("gtsp", "nearest", "random")
 CONTROLLERS = {"mpc": True, "geometric": False}
 FACTORS = (2.0, 0.5)
 TIMEOUT_S = 3600.0
-BLOCK = 10  # seeds after which the other controller has its turn, so that a table has pairs early
+BLOCK = 4  # seeds after which the other controller has its turn, so that a table has pairs early
 
 Key = tuple[str, int]
 
