@@ -34,7 +34,7 @@ MOST_POLICIES = 1000
 ALL = "all"
 """An entry of ``policies``: every policy that comes with pushplan."""
 _KEYS = ("schema", "name", "suites", "policies", "episodes", "seed", "metrics", "timeout_s")
-_MORE = ("observation", "latency_factor", "memory_limit_mb", "traces", "misfits")
+_MORE = ("observation", "latency_factor", "clock", "memory_limit_mb", "traces", "misfits")
 _MISFITS = ("refuse", "skip")
 _POLICY = ("policy", "label", "parameters", "sweep", "deadline_s")
 _SUITE = ("suite", "scenarios", "worlds", "episodes", "seed", "variations", "policies")
@@ -53,7 +53,7 @@ def fields_of(data: object, folder: Path) -> dict[str, Any]:
         raise SchemaError(f"this pushplan reads schema {SCHEMA!r}, got {short(data['schema'])}")
     episodes = integer("episodes", data.get("episodes", EPISODES), low=1)
     seed = integer("seed", data.get("seed", 0), low=0)
-    names = ("timeout_s", "observation", "latency_factor")
+    names = ("timeout_s", "observation", "latency_factor", "clock")
     policies = [_policies(one, folder) for one in _list("policies", data["policies"])]
     given = _list("suites", data["suites"])
     each = episodes if "episodes" in data else 1  # a file without a spread is one scene

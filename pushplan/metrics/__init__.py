@@ -3,6 +3,7 @@
 from pushplan.metrics.lengths import interaction_work, object_path_lengths
 from pushplan.metrics.manipulation import ManipulationScores, manipulation_scores
 from pushplan.metrics.navigation import NavigationScores, navigation_scores
+from pushplan.metrics.pushes import Pushing, pushing
 from pushplan.metrics.registry import METRICS, Metric, Role, compute, metric_function, metric_names
 from pushplan.world.polyline import path_length
 
@@ -11,6 +12,7 @@ __all__ = [
     "ManipulationScores",
     "Metric",
     "NavigationScores",
+    "Pushing",
     "Role",
     "compute",
     "interaction_work",
@@ -20,4 +22,5 @@ __all__ = [
     "navigation_scores",
     "object_path_lengths",
     "path_length",
+    "pushing",
 ]

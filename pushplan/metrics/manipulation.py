@@ -219,29 +219,31 @@ def _reference_ends(goal: AreaGoal | GoalDisc) -> FloatArray:
     return ends.reshape(-1, 2)
 
 
+def place_errors(episode: Episode) -> tuple[FloatArray, FloatArray]:
+    """Distances [m] and least turns [rad] at the end of the (N,) objects that have places."""
+    goal = episode.world.goal
+    if not isinstance(goal, ObjectGoals):
+        return np.zeros(0), np.zeros(0)
+    poses = episode.object_poses[-1]
+    places = goal.assigned(episode.world.movables.ids, poses)
+    k = np.flatnonzero(places >= 0)
+    distances, turns = goal.errors(poses[k, None])
+    chosen = np.arange(len(k)), places[k]
+    return distances[chosen], turns[chosen]
+
+
 def place_error(episode: Episode) -> float | None:
     """Mean distance [m] of the objects from the middles of their places at the end."""
-    return _errors(episode)[0]
+    return _mean(place_errors(episode)[0])
 
 
 def heading_error(episode: Episode) -> float | None:
     """Mean turn [rad] of the objects from their headings at the end, up to symmetry."""
-    return _errors(episode)[1]
+    return _mean(place_errors(episode)[1])
 
 
-def _errors(episode: Episode) -> tuple[float, float] | tuple[None, None]:
-    """Mean errors at the end, of a goal with a place for each object; None for other goals."""
-    goal = episode.world.goal
-    if not isinstance(goal, ObjectGoals):
-        return None, None
-    poses = episode.object_poses[-1]
-    places = goal.assigned(episode.world.movables.ids, poses)
-    k = np.flatnonzero(places >= 0)
-    if not len(k):
-        return None, None
-    distances, turns = goal.errors(poses[k, None])
-    chosen = np.arange(len(k)), places[k]
-    return float(distances[chosen].mean()), float(turns[chosen].mean())
+def _mean(errors: FloatArray) -> float | None:
+    return float(errors.mean()) if len(errors) else None
 
 
 def s_manip(episode: Episode) -> float:

@@ -64,6 +64,7 @@ class Metric:
 
 _NAVIGATION = "pushplan.metrics.navigation"
 _MANIPULATION = "pushplan.metrics.manipulation"
+_PUSHES = "pushplan.metrics.pushes"
 _FACTS = "pushplan.metrics.lengths"
 
 _METRICS: dict[str, Metric] = {
@@ -87,6 +88,13 @@ _METRICS: dict[str, Metric] = {
     ),
     "heading_error_rad": Metric(
         f"{_MANIPULATION}:heading_error", Role.ON_REQUEST, higher_is_better=False, goal="objects"
+    ),
+    **{
+        name: Metric(f"{_PUSHES}:{name}", Role.ON_REQUEST, higher_is_better=False, goal="objects")
+        for name in ("pushes", "relocations", "transit_distance_m")
+    },
+    "pushing_distance_m": Metric(
+        f"{_PUSHES}:pushing_distance_m", Role.ON_REQUEST, higher_is_better=None, goal="objects"
     ),
     "made_unsolvable": Metric(
         "pushplan.metrics.closing:made_unsolvable",

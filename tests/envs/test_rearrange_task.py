@@ -7,7 +7,7 @@ import pytest
 
 from pushplan.envs import PushEnv
 from pushplan.metrics import compute
-from pushplan.world import Episode
+from pushplan.world import Drive, Episode, ScenarioError
 
 
 def env_of(**variations):
@@ -50,3 +50,27 @@ def test_scores_go_by_the_own_places():
     assert scores["I_manip"] == pytest.approx(1.0, abs=0.05)
     missed = np.hypot(*(start[1] - world.goal.poses[1])[:2])
     assert scores["place_error_m"] == pytest.approx(0.5 * missed)
+
+
+@pytest.mark.parametrize(("simulator", "preset"), [("pymunk", "benchmark"), ("mujoco", "testbed")])
+def test_a_car_stays_one(simulator, preset):
+    options = {"task": "rearrange", "simulator": simulator, "preset": preset}
+    variations = {"robot": "racecar", "objects": 1, "room": 5.0}
+    env = PushEnv(**options, variations=variations, observation="state")
+    env.reset(seed=1)
+    robot = env.world.robot
+    assert (robot.name, robot.drive) == ("racecar", Drive.CAR)
+    start = env.world.robot_pose
+    env.step(np.array([0.0, 1.0]))
+    moved = env.world.robot_pose - start
+    assert np.abs(moved).max() < 0.01  # it does not turn on the spot
+    with pytest.raises(ScenarioError, match="bumper 'pusher' does not fit"):
+        PushEnv(**options, variations={**variations, "bumper": "pusher"})
+
+
+def test_friction_and_masses_may_be_off_without_being_told():
+    calm = env_of(objects=2)
+    env = env_of(objects=2, mass_scale=2.0, parameters="unknown", bumper_friction=0.8)
+    assert env.true_world.movables.masses == pytest.approx(2.0 * calm.world.movables.masses)
+    assert env.world.movables.masses == pytest.approx(calm.world.movables.masses)
+    assert env.task.materials.robot_object == 0.8

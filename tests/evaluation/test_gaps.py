@@ -109,6 +109,14 @@ WITHOUT = ("box-delivery-2d-large-columns-20", *OFFICES, *PLACES, "smoke")
 """The suites of which some scenarios have no best known solution, and the one of several tasks."""
 
 
+@pytest.mark.parametrize("name", PLACES)
+def test_a_bound_is_known_where_objects_have_places(name):
+    known = known_bounds()
+    one = suite(name).scenarios[-1]
+    assert known[one.key].bound == pytest.approx(scenario_bound(one).bound, rel=1e-5)
+    assert known[one.key].bound > 0.0
+
+
 @pytest.mark.parametrize("name", [name for name in suite_names() if name not in WITHOUT])
 def test_a_solution_is_known_of_every_scenario(name):
     known = known_bounds()

@@ -292,6 +292,7 @@ def test_environments_tasks_and_settings_of_ones_own_count(
         JobSettings(timeout_s=2.0),
         JobSettings(latency_factor=1.0),
         JobSettings(observation="image"),
+        JobSettings(clock="cpu"),
     ]
     assert len({identity(settings=one) for one in several}) == len(several)
 

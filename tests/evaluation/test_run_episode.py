@@ -1,11 +1,16 @@
 from __future__ import annotations
 
+import time
+from typing import Any
+
 import numpy as np
 import pytest
 from evaluation_doubles import Ahead, LineEnv, LineScenario, Nan, Raises, WrongShape
 
-from pushplan.evaluation import InvalidActionError, PolicyError, run_episode
-from pushplan.world import Episode
+from pushplan.evaluation import InvalidActionError, Job, JobSettings, PolicyError, run_episode
+from pushplan.evaluation.run.execute import execute
+from pushplan.evaluation.run.policy_specs import PolicySpec
+from pushplan.world import Episode, World
 
 
 def test_an_episode_holds_every_pose_action_and_timing(tmp_path) -> None:
@@ -48,3 +53,20 @@ def test_what_a_policy_does_wrong_has_a_name() -> None:
         run_episode(LineEnv(scenario), Nan(), scenario)
     with pytest.raises(InvalidActionError, match=r"shape \(1,\)"):
         run_episode(LineEnv(scenario), WrongShape(), scenario)
+
+
+class Dozes(Ahead):
+    """Does nothing for a while before each decision."""
+
+    def act(self, world: World, observation: Any) -> Any:
+        time.sleep(0.02)
+        return super().act(world, observation)
+
+
+def test_the_clock_of_the_processor_stands_while_a_policy_waits() -> None:
+    times = {}
+    for clock in ("wall", "cpu"):
+        settings = JobSettings(make_env="evaluation_doubles:make_env", clock=clock, dry_run=False)
+        row = execute(Job(PolicySpec("dozes", Dozes), LineScenario(0)), settings).row
+        times[clock] = row.decision_time_median_s
+    assert 0.0 < times["cpu"] < 0.02 <= times["wall"]

@@ -147,7 +147,8 @@ class Task(ABC):
         others = () if solid else sorted(robots().keys() - ROBOTS)
         try:
             choice("robot", name, (*preset.robots, *others))
-            if preset.bumper is None and bumper not in (None, "none"):
+            usual = preset.robots.get(name, {}).get("bumper", preset.bumper)
+            if usual is None and bumper not in (None, "none"):
                 raise InvalidInputError(
                     f"bumper {bumper!r} does not fit the robot of this preset: it has none, or "
                     "one of its own (valid: none)"
@@ -155,8 +156,8 @@ class Task(ABC):
         except InvalidInputError as error:
             raise ScenarioError(f"{self.name}: {error}") from error
         options = {}
-        if preset.bumper is not None:
-            options["bumper"] = bumper or preset.bumper
+        if usual is not None:
+            options["bumper"] = bumper or usual
         make = make_robot if name in others else preset.robot
         robot: RobotModel = make(name, drive_of(self.action), **options)
         self._drive(robot)

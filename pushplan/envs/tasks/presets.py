@@ -22,9 +22,13 @@ class Preset(SimpleNamespace):
     materials: Materials
 
     def robot(self, name: str, drive: Drive, **options: Any) -> RobotModel:
-        """One of the ``robots`` of the file, with further options of its maker."""
-        entry = dict(self.robots[name])
-        robot: RobotModel = resolve_name(entry.pop("make"))(drive=drive, **entry, **options)
+        """One of the ``robots`` of the file, with further options of its maker.
+
+        The drive counts unless the file gives the robot one of its own.
+        """
+        entry = {"drive": drive, **self.robots[name]}
+        entry.pop("bumper", None)
+        robot: RobotModel = resolve_name(entry.pop("make"))(**entry, **options)
         return robot
 
 

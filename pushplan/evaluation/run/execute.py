@@ -47,6 +47,7 @@ from pushplan.world.policy_abilities import (
 )
 
 DRY_RUN_STEPS = 2
+_CLOCKS = {"wall": time.perf_counter, "cpu": time.process_time}
 _ABILITIES = (
     *(ChecksEnvironment, ChoosesActions, ChoosesObservation, HoldsDecisions, LogsPlans),
     *(PlansBesideDriving, ShowsPlan),
@@ -106,7 +107,11 @@ def _execute(job: Job, settings: JobSettings) -> JobResult:
     except UnusablePolicyError as error:
         return failed_result(job, Status.POLICY_ERROR, str(error), traceback.format_exc())
     recording = Recording(
-        policy, job.scenario, job.policy.label, latency_factor=settings.latency_factor
+        policy,
+        job.scenario,
+        job.policy.label,
+        latency_factor=settings.latency_factor,
+        clock=_CLOCKS[settings.clock],
     )
     begin = time.perf_counter()
     began = instant()

@@ -115,12 +115,15 @@ def settings_dict(settings: JobSettings) -> dict[str, Any]:
     make = settings.make_env
     if not isinstance(make, str):
         make = getattr(make, "__qualname__", "callable")
-    return {
+    found = {
         "make_env": make,
         "observation": settings.observation,
         "timeout_s": settings.timeout_s,
         "latency_factor": settings.latency_factor,
     }
+    if settings.clock != "wall":  # jobs of older runs do not name it
+        found["clock"] = settings.clock
+    return found
 
 
 def same_but_versions(spec: Mapping[str, Any]) -> str:

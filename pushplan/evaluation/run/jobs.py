@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 from pushplan.errors import describe
 from pushplan.evaluation.run.policy_calls import wanted_observation
@@ -14,7 +14,7 @@ from pushplan.evaluation.run.policy_specs import PolicySpec
 from pushplan.evaluation.store.rows import ResultRow, Status, blank_row, checked_row, clean_reason
 from pushplan.imports.named_objects import load_object
 from pushplan.world import ChecksEnvironment, ChoosesActions, InvalidInputError, Policy
-from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, PositiveFloat
+from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, OneOf, PositiveFloat
 
 DEFAULT_ENV = "pushplan.envs:make"
 DETAIL_HALF = 10_000  # characters of a traceback that are kept at its beginning and at its end
@@ -82,6 +82,8 @@ class JobSettings(CheckedFields):
             recording them, so that the loading of libraries is in nobody's planning times.
         latency_factor: seconds of the world's clock for each second that a policy computes; None
             for a world that stands still meanwhile. See `run_episode`.
+        clock: what times of decisions count: ``"wall"``, or ``"cpu"``, the processor time of the
+            process, to which other processes on the machine matter little.
     """
 
     make_env: str | Callable[..., Any] = DEFAULT_ENV
@@ -90,6 +92,7 @@ class JobSettings(CheckedFields):
     grace_s: NonNegativeFloat = 2.0
     dry_run: bool = True
     latency_factor: NonNegativeFloat | None = None
+    clock: Annotated[str, OneOf(("wall", "cpu"))] = "wall"
 
     @property
     def force_after_s(self) -> float | None:
