@@ -18,6 +18,8 @@ from pushplan.world.checks import FloatArray
 
 _ALIGNED = math.radians(0.4)  # error of a heading that is left where a push begins
 _PLACED = 0.004  # error of the place that is left there [circumscribed radii]
+_PASSED = 0.12  # distance at which a corner of the way counts as reached [circumscribed radii]
+_ROUGHLY = math.radians(12.0)  # error of the heading with which it sets out for one
 _STEP = 0.12  # distance of poses on a straight way [circumscribed radii]
 _PRESS = 0.02  # by which the robot drives on into contact [circumscribed radii]
 _LOST_GAP = 0.25  # gap between bumper and object at which it is lost [circumscribed radii]
@@ -80,23 +82,40 @@ class PlaceExecution:
         return world.movables.poses[found[0]] if len(found) else None
 
     def _on_the_way(self, way: Legs | FloatArray) -> Follower:
-        config = self._config
         if not isinstance(way, Legs):
             return self._through(way)
-        follower = LegFollower(
-            self._robot,
-            way,
-            near=_PLACED * self._robot.circumscribed_radius + config.position_noise,
-            aligned=_ALIGNED + config.heading_noise,
-            response=config.response,
-        )
+        config = self._config
+        size = self._robot.circumscribed_radius
+        last = Legs.ahead(way.points[-1:], way.heading)
+        drivers = [
+            LegFollower(
+                self._robot,
+                last,
+                near=_PLACED * size + config.position_noise,
+                aligned=_ALIGNED + config.heading_noise,
+                response=config.response,
+            )
+        ]
+        if len(way.points) > 1:
+            around = Legs.ahead(way.points[:-1])
+            drivers.insert(
+                0,
+                LegFollower(
+                    self._robot, around, near=_PASSED * size, aligned=_ROUGHLY, response=config.response
+                ),
+            )
 
         def command(world: World, held: float) -> Twist | None:
-            twist = follower.command(world.robot_pose, world.time, held)
-            if twist is None and not follower.arrived:
-                self.stuck = True
-                self._stages.clear()
-            return twist
+            while drivers:
+                twist = drivers[0].command(world.robot_pose, world.time, held)
+                if twist is not None:
+                    return twist
+                if not drivers[0].arrived:
+                    self.stuck = True
+                    self._stages.clear()
+                    return None
+                drivers.pop(0)
+            return None
 
         return command
 

@@ -29,6 +29,8 @@ _MOST_FAILURES = 3  # after so many it waits until another push has succeeded
 _WAITS = 6  # for so many others an object is in the way that has just made room
 _IN_THE_WAY = 9.0  # cost of an end on the place of another object, or in its way
 _SHOVES = 28.0  # cost of a push that carries other objects along
+_TIGHT = 2.0  # of one that passes other objects closely
+_NEIGHBOURS = 2.5  # distance from the objects that are left, of those that are shoved for them
 _SPACE = 1.1  # distance from other objects that is worth something
 _SPACE_COST = 7.0  # cost where there is none of it
 _DONE = 7.0  # cost of moving an object that is done
@@ -372,10 +374,15 @@ class PlacePushes:
         return found
 
     def shoves(self) -> list[PlacePush]:
-        """Straight pushes of any object, whatever they carry along."""
+        """Straight pushes of objects that are left or near these, whatever they carry along."""
+        scene = self._scene
         found = []
-        for k in range(len(self._scene.movables)):
-            found += self._moves(k, shoves=True)
+        for k in range(len(scene.movables)):
+            away = np.hypot(*(scene.poses[scene.left] - scene.poses[k])[:, :2].T)
+            near = int(np.argmin(away))
+            if away[near] < _NEIGHBOURS * scene.size:
+                favours = -1 if k in scene.left else scene.left[near]
+                found += [replace(push, favours=favours) for push in self._moves(k, shoves=True)]
         return found
 
     def _moves(self, k: int, shoves: bool = False) -> Iterator[PlacePush]:
@@ -397,7 +404,10 @@ class PlacePushes:
                 space = min((shape.distance(other) for other in others), default=math.inf)
                 cost = _SPACE_COST * max(0.0, 1.0 - space / (_SPACE * size))
                 if not free:
-                    cost += _SHOVES
+                    touched = not is_clear(
+                        core.CollisionChecker(contact.body, scene.among(k)), poses
+                    )
+                    cost += _SHOVES if touched else _TIGHT
                 if scene.done[k]:
                     cost += _DONE
                 wanted = scene.wanted_shapes.items()
