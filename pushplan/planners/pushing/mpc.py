@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pushplan.control.episode_clock import EpisodeClock
-from pushplan.control.limits import driven_twist
+from pushplan.control.limits import clamp_twist, driven_twist
 from pushplan.control.mpc.inputs import limits_of, track_of
 from pushplan.core import control
 from pushplan.core import pushing as core
@@ -117,14 +117,14 @@ class PushingMpc:
             world.time,
             held,
         )
-        return Twist(*command)
+        return clamp_twist(world.robot, *command)
 
     def _prepare(self, world: World, plan: Plan) -> core.PushTracker:
         """Start afresh where the episode or the robot has changed."""
         robot = world.robot
         config = self.config
-        if robot.drive is not Drive.DIFFERENTIAL:
-            raise InvalidInputError("pushing along a path needs a differential drive")
+        if robot.drive is Drive.CONSTANT_SPEED:
+            raise InvalidInputError("pushing along a path needs a robot that can stop")
         if not plan.subtasks or not plan.subtasks[0].object_ids:
             raise InvalidInputError(
                 "the plan must name the box in its first sub-task, as PushPath.plan does"
@@ -172,7 +172,7 @@ class PushingMpc:
         self._models = [PushModel(world.robot, outline, parameters, face, radius) for face in faces]
         self._tracker.begin(
             [
-                _face(model, score, self.config)
+                _face(world.robot, model, score, self.config)
                 for model, score in zip(self._models, scores, strict=True)
             ],
             _clearance(world.robot, self._models[0], self.config),
@@ -195,11 +195,17 @@ def groups_of(horizon: int, moves: int) -> IntArray:
     return np.searchsorted(ends, np.arange(horizon), side="right").astype(np.int64)
 
 
-def _face(model: PushModel, score: FloatArray, config: PushingConfig) -> core.Face:
+def _face(
+    robot: RobotModel, model: PushModel, score: FloatArray, config: PushingConfig
+) -> core.Face:
     """A side of a box; ``score`` (3,) as `faces_of` gives it."""
     stable = model.stable_curvature()
-    is_limited = stable * model.reach > 0.02
-    curvature = config.margin * stable if is_limited else -1.0
+    curvature = -1.0
+    if stable * model.reach > 0.02:
+        curvature = config.margin * stable
+    if robot.min_turning_radius > 0.0:
+        tightest = 1.0 / robot.min_turning_radius
+        curvature = min(curvature, tightest) if curvature >= 0.0 else tightest
     return core.Face(score, model.contact, model.face.normal, curvature)
 
 

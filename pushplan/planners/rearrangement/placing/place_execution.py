@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from pushplan.control import LegFollower, Legs, PoseFollower, StallChecker
+from pushplan.control.limits import approach_speed
 from pushplan.planners.rearrangement.placing.contact import ahead_of, compose, inverse
 from pushplan.planners.rearrangement.placing.curves import Turning
 from pushplan.planners.rearrangement.placing.place_order import PlaceChoice
@@ -15,12 +16,15 @@ from pushplan.planners.pushing import PushingConfig, PushingMpc, PushParameters,
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.world import RobotModel, Twist, World
 from pushplan.world.checks import FloatArray
+from pushplan.world.polyline import path_length
 
 _ALIGNED = math.radians(0.4)  # error of a heading that is left where a push begins
 _PLACED = 0.004  # error of the place that is left there [circumscribed radii]
 _PASSED = 0.12  # distance at which a corner of the way counts as reached [circumscribed radii]
 _ROUGHLY = math.radians(12.0)  # error of the heading with which it sets out for one
 _STEP = 0.12  # distance of poses on a straight way [circumscribed radii]
+_BRAKING = 0.5  # time in which a push comes to a stop, so that the object does not run ahead [s]
+_BEYOND = 30  # poses by which the path of an object is longer than its way
 _PRESS = 0.02  # by which the robot drives on into contact [circumscribed radii]
 _LOST_GAP = 0.25  # gap between bumper and object at which it is lost [circumscribed radii]
 _LOST_ASIDE = 1.2  # offset at which it is [half widths of the bumper]
@@ -37,16 +41,21 @@ class PlaceExecution:
         choice: the push and the way to it.
         world: as it begins.
         config: settings; ``mpc`` says by which controller the object is pushed.
+        grip: friction that is counted on.
 
     Attributes:
         pushing: the push itself has begun.
         stuck: the robot did not get to its start.
+        slip: how far the object has slid to the left on the bumper during the push [m].
     """
 
-    def __init__(self, choice: PlaceChoice, world: World, config: RearrangementConfig) -> None:
+    def __init__(
+        self, choice: PlaceChoice, world: World, config: RearrangementConfig, grip: float
+    ) -> None:
         self.push = choice.push
         self.label = int(world.movables.ids[choice.push.k])
         self._config = config
+        self._grip = grip
         self._robot = world.robot
         self._goal = choice.push.object_pose
         self._stages: list[Callable[[World], Follower]] = [
@@ -58,6 +67,8 @@ class PlaceExecution:
         self._follower: Follower | None = None
         self.pushing = False
         self.stuck = False
+        self.slip = 0.0
+        self._aside = 0.0
 
     def command(self, world: World, held: float) -> Twist | None:
         """The velocity to drive now; None at the end.
@@ -134,6 +145,7 @@ class PlaceExecution:
         there = self._object(world)
         if there is None or self._is_lost(world, there):
             return lambda world, held: None
+        self._aside = self._offset(world, there)
         poses = self._from_here(world.robot_pose, there)
         if self._config.mpc:
             return self._by_prediction(world, poses, there)
@@ -166,18 +178,25 @@ class PlaceExecution:
         """Push by `PushingMpc` along the poses that the object has on the way."""
         config = self._config
         seen = compose(inverse(poses[0]), there)
-        path = np.array([compose(pose, seen) for pose in poses])
+        step = compose(inverse(poses[-2]), poses[-1])
+        beyond = [poses[-1]]  # else the controller would turn too little at the end
+        for _ in range(_BEYOND):
+            beyond.append(compose(beyond[-1], step))
+        length = path_length(poses_of(poses, seen)[:, :2])
+        poses = np.vstack([poses, beyond[1:]])
+        path = poses_of(poses, seen)
         path[:, 2] = poses[:, 2]
         plan = PushPath(path).plan(self._robot, self.label)
         pusher = PushingMpc(
             PushingConfig(
-                parameters=PushParameters(config.grip),
+                parameters=PushParameters(self._grip),
                 period=config.response,
                 heading=1.0,
             )
         )
         pusher.reset(world)
         stall = StallChecker(self._robot)
+        braking = min(self._robot.max_acceleration, self._robot.max_speed / _BRAKING)
 
         def command(world: World, held: float) -> Twist | None:
             there = self._object(world)
@@ -186,10 +205,10 @@ class PlaceExecution:
             if stall.update(world.robot_pose, world.time):
                 return None
             twist = pusher.command(world, plan)
-            left = plan.length - pusher.along
+            left = length - pusher.along
             if left < 1e-6:
                 return None
-            slower = min(1.0, left / max(twist.linear * held, 1e-9))
+            slower = min(1.0, approach_speed(left, braking, held) / max(twist.linear, 1e-9))
             twist = Twist(slower * twist.linear, slower * twist.angular)
             stall.send(twist)
             return twist
@@ -204,8 +223,15 @@ class PlaceExecution:
         wide = abs(y) > _LOST_ASIDE * model.bumper.half
         return wide or gap > _LOST_GAP * self._robot.circumscribed_radius
 
+    def _offset(self, world: World, there: FloatArray) -> float:
+        """Of an object at a pose (3,), to the left of the robot's middle [m]."""
+        return float(compose(inverse(world.robot_pose), there)[1])
+
     def _back(self, world: World) -> Follower:
         push = self.push
+        there = self._object(world)
+        if there is not None:
+            self.slip = self._offset(world, there) - self._aside
         off = float(np.hypot(*(push.end - push.poses[-1])[:2]))
         here = world.robot_pose
         return self._through(straight_poses(self._robot, here, ahead_of(here, -off)))
@@ -213,6 +239,11 @@ class PlaceExecution:
     def _through(self, poses: FloatArray) -> Follower:
         follower = PoseFollower(self._robot, poses, self._config.response)
         return lambda world, held: follower.command(world.robot_pose, world.time, held)
+
+
+def poses_of(poses: FloatArray, seen: FloatArray) -> FloatArray:
+    """(N, 3) poses of an object that a robot at poses (N, 3) sees at a pose (3,)."""
+    return np.array([compose(pose, seen) for pose in poses])
 
 
 def straight_poses(robot: RobotModel, start: FloatArray, end: FloatArray) -> FloatArray:

@@ -16,6 +16,9 @@ from pushplan.world import PendingResult, PlanningExecutor, Stop, Twist, World
 
 _MOST_ENDS = 3  # pushes and recoveries that may end in one step until the robot waits
 _RETREAT = 0.3  # distance that the robot backs off where it is stuck [circumscribed radii]
+_SLIPPED = 0.1  # way of an object on the bumper that shows too little grip [circumscribed radii]
+_LESS_GRIP = 0.75  # part of the grip that is counted on from then on
+_LEAST_GRIP = 0.25  # least part of that of the settings
 _WAIT = 1.0  # time after which it looks again where there is no push [s]
 
 
@@ -37,6 +40,7 @@ class Placer:
         self._rng = np.random.default_rng(0)
         self._look_at = -math.inf
         self.order: tuple[PlacePush, ...] = ()
+        self._grip = config.grip
         self._recovery: Recovery | None = None
         self._retreats = 0
         self.pushes = 0
@@ -71,7 +75,7 @@ class Placer:
     def _choose(self, world: World) -> bool:
         """Begin with a push; False if there is none, or it is not chosen yet."""
         if self._call is None:
-            scene = PlacingScene(world, self._config.grip)
+            scene = PlacingScene(world, self._grip)
             self._call = self.executor.submit(
                 lambda stop: self._best(scene), world.time, self._stop
             )
@@ -88,7 +92,7 @@ class Placer:
         if choice.push.favours >= 0:
             self._history.waits[int(ids[choice.push.k])] = int(ids[choice.push.favours])
         self.pushes += 1
-        self._execution = PlaceExecution(choice, world, self._config)
+        self._execution = PlaceExecution(choice, world, self._config, self._grip)
         return True
 
     def _best(self, scene: PlacingScene) -> PlaceChoice | None:
@@ -102,8 +106,10 @@ class Placer:
     def _close(self, world: World, execution: PlaceExecution) -> None:
         """Note whether the push has brought its object home."""
         self._execution = None
-        scene = PlacingScene(world, self._config.grip)
+        scene = PlacingScene(world, self._grip)
         push = execution.push
+        if abs(execution.slip) > _SLIPPED * scene.size:
+            self._grip = max(_LESS_GRIP * self._grip, _LEAST_GRIP * self._config.grip)
         if scene.done[push.k]:
             self._history.failures.clear()
             self._retreats = 0
