@@ -12,6 +12,7 @@ from pushplan.world.checks import FloatArray
 
 _ARCS = 5  # pieces of a curve at most
 _VIAS = 60  # random poses that a way around may lead through
+_ANGLES = (0.35, 0.8, 1.4)  # of arcs from the ends that it may lead along [rad]
 _NEAREST = 12  # of them, to which each is joined
 
 
@@ -88,8 +89,21 @@ def way_around(
     drawn = np.random.default_rng(0).uniform(
         (bounds[0], bounds[1], -math.pi), (bounds[2], bounds[3], math.pi), (_VIAS, 3)
     )
+    drawn = np.vstack([drawn, *_beside(turning, start, 1.0), *_beside(turning, end, -1.0)])
     nodes = [start, end, *(pose for pose in drawn if checker.is_free(pose))]
     return _Roadmap(turning, checker, nodes).path(most)
+
+
+def _beside(turning: Turning, pose: FloatArray, ahead: float) -> list[FloatArray]:
+    """Poses (3,) on straight ways and arcs from a pose, also the other way if it reverses."""
+    found = []
+    for sign in (ahead, -ahead) if turning.reverses else (ahead,):
+        for angle in _ANGLES:
+            for curvature in (0.0, 1.0 / turning.radius, -1.0 / turning.radius):
+                out = np.empty(3)
+                core.along_arc(pose, sign * angle * turning.radius, curvature, out)
+                found.append(out)
+    return found
 
 
 class _Roadmap:

@@ -35,6 +35,7 @@ _SPACE = 1.1  # distance from other objects that is worth something
 _SPACE_COST = 7.0  # cost where there is none of it
 _DONE = 7.0  # cost of moving an object that is done
 _AROUND = 3  # pairs of face and heading for which ways around are looked for
+_FOLLOWING = 6  # curves after a push that are looked at
 _CLOSE_ENOUGH = (0.6, 0.8)  # errors of place and heading, in tolerances, that need no next push
 
 
@@ -132,6 +133,15 @@ class PlacingHistory:
         return int(scene.movables.ids[k]), round(contact.model.face.normal, 3), final
 
 
+class _Curve(NamedTuple):
+    """A curve that is not checked yet; poses are those of the robot."""
+
+    length: float
+    contact: Contact
+    start: FloatArray
+    end: FloatArray
+
+
 class _Option(NamedTuple):
     """A push that may be made, not checked yet; poses are those of the robot."""
 
@@ -140,7 +150,7 @@ class _Option(NamedTuple):
     start: FloatArray
     target: FloatArray
     length: float
-    following: tuple[tuple[float, Contact, FloatArray, FloatArray], ...]  # the next push, sorted
+    following: tuple[_Curve, ...]  # the next push, the shortest first
     penalty: float
 
 
@@ -225,20 +235,18 @@ class PlacePushes:
         scene = self._scene
         size = scene.size
         here = scene.poses[k]
-        goals = scene.goal_poses(k)
-        ends = [(contact, contact.robot_at(goal)) for contact in scene.contacts[k] for goal in goals]
+        goal = scene.goal_poses(k)[0]
         for contact in scene.contacts[k]:
             start = contact.robot_at(here)
             turning = scene.pushes(contact)
             failed = self._history.cost(scene, k, contact, True)
-            for other, end in ends:
-                if other is contact:
-                    length = turning.length(start, end)
-                    if length < _LONGEST * size:
-                        yield _Option(length + failed, contact, start, end, length, (), failed)
+            for end in scene.ends(k, contact):
+                length = turning.length(start, end)
+                if length < _LONGEST * size:
+                    yield _Option(length + failed, contact, start, end, length, (), failed)
             failed = self._history.cost(scene, k, contact, False)
             heading = np.array([math.cos(start[2]), math.sin(start[2])])
-            along = float((goals[0][:2] - here[:2]) @ heading)
+            along = float((goal[:2] - here[:2]) @ heading)
             lengths = {length * size for length in _LENGTHS}
             if along > 0.02 * size:
                 lengths.add(along)
@@ -248,21 +256,33 @@ class PlacePushes:
                 if self._is_close(k, there):
                     yield _Option(length + failed, contact, start, target, length, (), failed)
                     continue
-                begins = {id(other): other.robot_at(there) for other in scene.contacts[k]}
-                following = sorted(
-                    (
-                        (scene.pushes(other).length(begins[id(other)], end), n)
-                        for n, (other, end) in enumerate(ends)
-                    )
-                )
-                nexts = tuple(
-                    (more, ends[n][0], begins[id(ends[n][0])], ends[n][1])
-                    for more, n in following[:6]
-                    if more < _LONGEST * size
-                )
+                nexts = self._following(k, there)
                 if nexts:
-                    bound = length + failed + nexts[0][0] + _AGAIN * size
+                    bound = length + failed + nexts[0].length + _AGAIN * size
                     yield _Option(bound, contact, start, target, length, nexts, failed)
+
+    def _following(self, k: int, there: FloatArray) -> tuple[_Curve, ...]:
+        """The shortest curves of object ``k`` from a pose (3,) to its place, not checked."""
+        scene = self._scene
+        found = []
+        for contact in scene.contacts[k]:
+            start = contact.robot_at(there)
+            for end in scene.ends(k, contact):
+                length = scene.pushes(contact).length(start, end)
+                found.append(_Curve(length, contact, start, end))
+        found.sort(key=lambda curve: curve.length)
+        return tuple(
+            curve for curve in found[:_FOLLOWING] if curve.length < _LONGEST * scene.size
+        )
+
+    def _next(self, k: int, curves: tuple[_Curve, ...]) -> tuple[bool, float, tuple[Part, ...]] | None:
+        """Whether objects block the best of some curves, its length and itself; None without one."""
+        found = []
+        for length, contact, start, end in curves:
+            part = self._part(k, contact, self._scene.pushes(contact).poses(start, end))
+            if part is not None:
+                found.append((not part[0], length, part[1]))
+        return min(found, key=lambda one: one[:2], default=None)
 
     def _checked(self, k: int, option: _Option) -> PlacePush | None:
         """The push, unless something static is in its way, or in that of the next."""
@@ -274,14 +294,10 @@ class PlacePushes:
         free, way = first
         rest = 0.0
         if option.following:
-            nexts = (
-                (length, self._part(k, contact, scene.pushes(contact).poses(start, end)))
-                for length, contact, start, end in option.following
-            )
-            found = [(not then[0], length, then[1]) for length, then in nexts if then is not None]
-            if not found:
+            found = self._next(k, option.following)
+            if found is None:
                 return None
-            blocked, length, then = min(found, key=lambda one: one[:2])
+            blocked, length, then = found
             free = free and not blocked
             rest = length + _AGAIN * scene.size
             way = (*way, *then)
@@ -400,7 +416,14 @@ class PlacePushes:
                 if part is None or not (part[0] or shoves):
                     continue
                 free, way = part
-                shape = scene.shape_at(k, contact.object_at(poses[-1]))
+                there = contact.object_at(poses[-1])
+                rest = _AGAIN * size
+                if scene.places[k] >= 0:
+                    found = self._next(k, self._following(k, there))
+                    if found is None:
+                        continue
+                    rest += found[1]
+                shape = scene.shape_at(k, there)
                 space = min((shape.distance(other) for other in others), default=math.inf)
                 cost = _SPACE_COST * max(0.0, 1.0 - space / (_SPACE * size))
                 if not free:
@@ -416,4 +439,4 @@ class PlacePushes:
                 penalty = cost * size + self._history.cost(scene, k, contact, False)
                 if math.isinf(penalty):
                     continue
-                yield self._push(k, way, length * size, _AGAIN * size, penalty, True)
+                yield self._push(k, way, length * size, rest, penalty, True)

@@ -43,6 +43,7 @@ class PlacingScene:
         self.friction = friction
         self.poses: FloatArray = world.movables.poses
         self.walls = obstacles(world.static)
+        self._ends: dict[tuple[int, int], list[FloatArray]] = {}
         self._bodies: dict[int, tuple[core.ConvexObstacles, core.CollisionChecker]] = {}
 
     @cached_property
@@ -92,6 +93,13 @@ class PlacingScene:
         if self.goal.heading_tolerances[place] >= math.pi:
             count = max(count, _HEADINGS)
         return [pose + np.array([0.0, 0.0, math.tau * i / count]) for i in range(count)]
+
+    def ends(self, k: int, contact: Contact) -> list[FloatArray]:
+        """Poses (3,) of the robot that has object ``k`` at its place on the bumper."""
+        key = k, id(contact)
+        if key not in self._ends:
+            self._ends[key] = [contact.robot_at(goal) for goal in self.goal_poses(k)]
+        return self._ends[key]
 
     def backed_off(self, k: int, pose: FloatArray, contact: Contact) -> FloatArray:
         """(3,) where the robot is once it has backed off object ``k`` from a pose (3,)."""
