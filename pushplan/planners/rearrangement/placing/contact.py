@@ -21,7 +21,7 @@ from pushplan.world.outline import convex_outline, flatten, transform
 
 _FRACTION = 0.7  # of the stable curvature that is used
 _LEAST_FACE = 0.2  # shortest face that is pushed [half widths of the bumper]
-_MARGIN = 0.07  # that robot and object keep from other objects [circumscribed radii]
+MARGIN = 0.07  # that robot and object keep from other objects [circumscribed radii]
 _STRAIGHT = 1e-3  # least curvature that is taken to be one [1/circumscribed radii]
 
 
@@ -85,7 +85,7 @@ def _contacts(
         pose = np.array([model.reach, -0.5 * (face.low + face.high), -face.normal])
         parts = [*robot.wall_parts, transform(pose, outline)]
         turning = max(1.0 / curvature, robot.min_turning_radius)
-        bodies = body_of(parts, 0.0), body_of(parts, _MARGIN * size)
+        bodies = body_of(parts, 0.0), body_of(parts, MARGIN * size)
         found.append(Contact(model, turning, pose, *bodies))
     return tuple(found)
 

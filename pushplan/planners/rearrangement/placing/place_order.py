@@ -119,7 +119,11 @@ def way_to(scene: PlacingScene, push: PlacePush) -> Legs | FloatArray | None:
     if scene.is_car:
         bounds = scene.world.static.bounds
         most = _LONGEST * scene.size
-        return way_around(scene.drives, here, target, scene.alone(-1), bounds, most)
+        for checker in (scene.alone_wide, scene.alone(-1)):
+            way = way_around(scene.drives, here, target, checker, bounds, most)
+            if way is not None:
+                return way
+        return None
     robot = scene.robot
     for clearance in (scene.size, 0.5 * (scene.size + robot.inscribed_radius)):
         path = scene.graph(clearance).shortest_path(here[:2], target[:2])

@@ -19,7 +19,9 @@ _RETREAT = 0.3  # distance that the robot backs off where it is stuck [circumscr
 _SLIPPED = 0.1  # way of an object on the bumper that shows too little grip [circumscribed radii]
 _LESS_GRIP = 0.75  # part of the grip that is counted on from then on
 _LEAST_GRIP = 0.25  # least part of that of the settings
-_WAIT = 1.0  # time after which it looks again where there is no push [s]
+_WAIT = 1.0
+_LONGEST_WAIT = 60.0
+"""Times after which it looks again where there is no push: at first, and in the end [s]."""
 
 
 class Placer:
@@ -39,6 +41,7 @@ class Placer:
         self._history = PlacingHistory()
         self._rng = np.random.default_rng(0)
         self._look_at = -math.inf
+        self._wait = _WAIT
         self.order: tuple[PlacePush, ...] = ()
         self._grip = config.grip
         self._recovery: Recovery | None = None
@@ -85,8 +88,11 @@ class Placer:
         self._call = None
         if choice is None:
             self._history.failures.clear()
-            self._look_at = world.time + _WAIT
-            return False
+            self._look_at = world.time + self._wait
+            self._wait = min(2.0 * self._wait, _LONGEST_WAIT)
+            self._recover(world)
+            return self._recovery is not None
+        self._wait = _WAIT
         self.order = choice.order
         ids = world.movables.ids
         if choice.push.favours >= 0:
@@ -116,8 +122,12 @@ class Placer:
         else:
             self._history.count(scene, push)
         if execution.stuck:
-            distance = _RETREAT * scene.size
-            self._recovery = Recovery(
-                world, distance, skip=self._retreats, looks=False, searches=False
-            )
-            self._retreats += 1
+            self._recover(world)
+
+    def _recover(self, world: World) -> None:
+        """Get off whatever the robot touches."""
+        distance = _RETREAT * world.robot.circumscribed_radius
+        self._recovery = Recovery(
+            world, distance, skip=self._retreats, looks=False, searches=False
+        )
+        self._retreats += 1

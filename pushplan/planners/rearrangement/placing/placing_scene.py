@@ -11,7 +11,12 @@ import shapely
 from pushplan.core import motion as core
 from pushplan.geometry import VisibilityGraph
 from pushplan.motion.collision import footprint, obstacles
-from pushplan.planners.rearrangement.placing.contact import Contact, ahead_of, contacts_of
+from pushplan.planners.rearrangement.placing.contact import (
+    MARGIN,
+    Contact,
+    ahead_of,
+    contacts_of,
+)
 from pushplan.planners.rearrangement.placing.curves import Turning
 from pushplan.world import Drive, ObjectGoals, StaticMap, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
@@ -130,6 +135,11 @@ class PlacingScene:
             among = obstacles(self.world.static, others)
             self._bodies[k] = among, core.CollisionChecker(footprint(self.robot), among)
         return self._bodies[k]
+
+    @cached_property
+    def alone_wide(self) -> core.CollisionChecker:
+        """Checks the robot, grown by what it keeps from things on its way, among everything."""
+        return core.CollisionChecker(footprint(self.robot, MARGIN * self.size), self.among(-1))
 
     @cached_property
     def alone_body(self) -> core.Footprint:
