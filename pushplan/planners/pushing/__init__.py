@@ -4,7 +4,7 @@ The model is quasi-static pushing of a convex box by a bumper under Coulomb fric
 a predictive one that keeps the box on the bumper. See docs/pushing.md.
 """
 
-from pushplan.planners.pushing.bumper import Bumper, Face, face_towards
+from pushplan.planners.pushing.bumper import Bumper, Face, face_towards, faces_of
 from pushplan.planners.pushing.mpc import PushingMpc
 from pushplan.planners.pushing.parameters import (
     PushingConfig,
@@ -26,6 +26,7 @@ __all__ = [
     "PushingConfig",
     "PushingMpc",
     "face_towards",
+    "faces_of",
     "pressure_radius",
     "spread_of",
     "stable_curvature",

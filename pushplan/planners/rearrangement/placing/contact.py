@@ -13,8 +13,7 @@ from shapely import Polygon
 
 from pushplan.core import motion as core
 from pushplan.geometry import gyration_squares
-from pushplan.planners.pushing import Bumper, PushModel, PushParameters
-from pushplan.planners.pushing.bumper import faces_of
+from pushplan.planners.pushing import Bumper, PushModel, PushParameters, faces_of
 from pushplan.world import Movables, RobotModel
 from pushplan.world.checks import FloatArray
 from pushplan.world.outline import convex_outline, flatten, transform
@@ -65,7 +64,9 @@ def contacts_of(
 ) -> tuple[Contact, ...]:
     """The contacts of object ``k`` that the robot can push at, one for each face of its hull."""
     compound = len(movables.parts(k)) > 1 or movables.gyration_radii[k] > 0.0
-    radius = math.sqrt(gyration_squares(movables.select([k]))[0]) if compound else 0.0
+    radius = 0.0
+    if compound:
+        radius = math.sqrt(gyration_squares(movables.select([k]))[0])
     return _contacts(robot, np.ascontiguousarray(movables.outline(k)).tobytes(), radius, friction)
 
 

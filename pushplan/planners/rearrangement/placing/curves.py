@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -135,14 +136,16 @@ class _Roadmap:
         from scipy.sparse.csgraph import dijkstra
 
         while True:
-            costs, before = dijkstra(self._lengths, indices=0, return_predecessors=True)
-            if not costs[1] <= most or math.isinf(costs[1]):
+            costs, before = dijkstra(
+                self._lengths, directed=True, indices=[0], return_predecessors=True
+            )
+            if not costs[0, 1] <= most or math.isinf(costs[0, 1]):
                 return None
             chain = [1]
             while chain[-1] != 0:
-                chain.append(int(before[chain[-1]]))
+                chain.append(int(before[0, chain[-1]]))
             chain.reverse()
-            edges = list(zip(chain, chain[1:], strict=False))
+            edges = list(itertools.pairwise(chain))
             blocked = [edge for edge in edges if not self._is_clear(edge)]
             if not blocked:
                 parts = [self._known[edge] for edge in edges]

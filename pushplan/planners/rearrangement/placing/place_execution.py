@@ -1,4 +1,4 @@
-"""`PlaceExecution`: one push to a place in hand: the way there, contact, the push, and backing off."""
+"""`PlaceExecution`: one push in hand: the way there, contact, the push, and backing off."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 
 from pushplan.control import LegFollower, Legs, PoseFollower, StallChecker
 from pushplan.control.limits import approach_speed
+from pushplan.planners.pushing import PushingConfig, PushingMpc, PushParameters, PushPath
 from pushplan.planners.rearrangement.placing.contact import ahead_of, compose, inverse
 from pushplan.planners.rearrangement.placing.curves import Turning
 from pushplan.planners.rearrangement.placing.place_order import PlaceChoice
-from pushplan.planners.pushing import PushingConfig, PushingMpc, PushParameters, PushPath
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.world import RobotModel, Twist, World
 from pushplan.world.checks import FloatArray
@@ -112,7 +112,11 @@ class PlaceExecution:
             drivers.insert(
                 0,
                 LegFollower(
-                    self._robot, around, near=_PASSED * size, aligned=_ROUGHLY, response=config.response
+                    self._robot,
+                    around,
+                    near=_PASSED * size,
+                    aligned=_ROUGHLY,
+                    response=config.response,
                 ),
             )
 
@@ -221,7 +225,7 @@ class PlaceExecution:
         x, y, _ = compose(inverse(world.robot_pose), there).tolist()
         gap = x - model.reach
         wide = abs(y) > _LOST_ASIDE * model.bumper.half
-        return wide or gap > _LOST_GAP * self._robot.circumscribed_radius
+        return wide or bool(gap > _LOST_GAP * self._robot.circumscribed_radius)
 
     def _offset(self, world: World, there: FloatArray) -> float:
         """Of an object at a pose (3,), to the left of the robot's middle [m]."""

@@ -84,16 +84,14 @@ def _tour(
         matrix[:count, :count] = costs[:count]
         matrix[count, :count] = costs[count] + later
         matrix[:count, count] = 0.0
-        tour = list(
-            solve_gtsp(matrix, [*clusters, [count]], stop=MaxIterations(_ITERATIONS)).nodes
-        )
+        tour = list(solve_gtsp(matrix, [*clusters, [count]], stop=MaxIterations(_ITERATIONS)).nodes)
         at = tour.index(count)
         return [int(n) for n in tour[at + 1 :] + tour[:at]]
-    reach = costs[count] - [push.cost for push in pushes] if order == "nearest" else None
     cheapest = [min(own, key=lambda n: (pushes[n].cost + later[n], n)) for own in clusters]
-    if reach is None:
+    if order == "random":
         ranks = rng.permutation(len(cheapest))
         return [n for _, n in sorted(zip(ranks + later[cheapest], cheapest, strict=True))]
+    reach = costs[count] - [push.cost for push in pushes]
     return sorted(cheapest, key=lambda n: (reach[n] + later[n], n))
 
 
@@ -105,7 +103,7 @@ def _costs(scene: PlacingScene, pushes: list[PlacePush]) -> FloatArray:
     if scene.is_car:
         drives = scene.drives
         ways = np.array([[drives.length(end, start) for start in starts] for end in ends])
-        return _DETOUR * ways + own
+        return np.asarray(_DETOUR * ways + own)
     away = starts[None, :, :] - ends[:, None, :]
     turns = np.abs(np.remainder(away[..., 2] + math.pi, math.tau) - math.pi)
     ways = _DETOUR * np.hypot(away[..., 0], away[..., 1]) + _TURN * scene.size * turns
@@ -128,6 +126,6 @@ def way_to(scene: PlacingScene, push: PlacePush) -> Legs | FloatArray | None:
     for clearance in (scene.size, 0.5 * (scene.size + robot.inscribed_radius)):
         path = scene.graph(clearance).shortest_path(here[:2], target[:2])
         if math.isfinite(path.length):
-            points = path.points[1:] if len(path.points) > 1 else path.points
+            points = path.points[min(1, len(path.points) - 1) :]
             return Legs.ahead(points, float(target[2]))
     return None

@@ -119,7 +119,9 @@ class PlacingHistory:
     def cost(self, scene: PlacingScene, k: int, contact: Contact, final: bool) -> float:
         """What to add to the cost of a push [m]; inf if it has been tried too often."""
         count = self.failures[self._key(scene, k, contact, final)]
-        return _FAILED * scene.size * count if count < _MOST_FAILURES else math.inf
+        if count >= _MOST_FAILURES:
+            return math.inf
+        return _FAILED * scene.size * count
 
     def waits_for(self, scene: PlacingScene, k: int) -> bool:
         """True if object ``k`` has made room for one that is not at its place yet."""
@@ -127,9 +129,7 @@ class PlacingHistory:
         return other in scene.movables.ids[scene.left].tolist()
 
     @staticmethod
-    def _key(
-        scene: PlacingScene, k: int, contact: Contact, final: bool
-    ) -> tuple[int, float, bool]:
+    def _key(scene: PlacingScene, k: int, contact: Contact, final: bool) -> tuple[int, float, bool]:
         return int(scene.movables.ids[k]), round(contact.model.face.normal, 3), final
 
 
@@ -199,9 +199,7 @@ class PlacePushes:
     def _is_clear_of(self, push: PlacePush, k: int, pose: FloatArray) -> bool:
         """True if a push and the next are clear of object ``k`` at a pose (3,)."""
         scene = self._scene
-        there = obstacles(
-            scene.empty, [transform(pose, part) for part in scene.movables.parts(k)]
-        )
+        there = obstacles(scene.empty, [transform(pose, part) for part in scene.movables.parts(k)])
         return all(
             is_clear(core.CollisionChecker(part.contact.wide, there), part.poses)
             for part in push.way
@@ -271,12 +269,12 @@ class PlacePushes:
                 length = scene.pushes(contact).length(start, end)
                 found.append(_Curve(length, contact, start, end))
         found.sort(key=lambda curve: curve.length)
-        return tuple(
-            curve for curve in found[:_FOLLOWING] if curve.length < _LONGEST * scene.size
-        )
+        return tuple(curve for curve in found[:_FOLLOWING] if curve.length < _LONGEST * scene.size)
 
-    def _next(self, k: int, curves: tuple[_Curve, ...]) -> tuple[bool, float, tuple[Part, ...]] | None:
-        """Whether objects block the best of some curves, its length and itself; None without one."""
+    def _next(
+        self, k: int, curves: tuple[_Curve, ...]
+    ) -> tuple[bool, float, tuple[Part, ...]] | None:
+        """The best of some curves: whether objects block it, its length, itself; None without."""
         found = []
         for length, contact, start, end in curves:
             part = self._part(k, contact, self._scene.pushes(contact).poses(start, end))

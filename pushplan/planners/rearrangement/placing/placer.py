@@ -9,7 +9,11 @@ import numpy as np
 from pushplan.control import ImmediateExecutor, Recovery
 from pushplan.planners.rearrangement.placing.place_execution import PlaceExecution
 from pushplan.planners.rearrangement.placing.place_order import PlaceChoice, first_push
-from pushplan.planners.rearrangement.placing.place_push import PlacePush, PlacePushes, PlacingHistory
+from pushplan.planners.rearrangement.placing.place_push import (
+    PlacePush,
+    PlacePushes,
+    PlacingHistory,
+)
 from pushplan.planners.rearrangement.placing.placing_scene import PlacingScene
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.world import PendingResult, PlanningExecutor, Stop, Twist, World
@@ -127,7 +131,5 @@ class Placer:
     def _recover(self, world: World) -> None:
         """Get off whatever the robot touches."""
         distance = _RETREAT * world.robot.circumscribed_radius
-        self._recovery = Recovery(
-            world, distance, skip=self._retreats, looks=False, searches=False
-        )
+        self._recovery = Recovery(world, distance, skip=self._retreats, looks=False, searches=False)
         self._retreats += 1

@@ -71,9 +71,7 @@ class PlacingScene:
     def contacts(self) -> tuple[tuple[Contact, ...], ...]:
         """The contacts of each object."""
         count = len(self.movables)
-        return tuple(
-            contacts_of(self.robot, self.movables, k, self.friction) for k in range(count)
-        )
+        return tuple(contacts_of(self.robot, self.movables, k, self.friction) for k in range(count))
 
     @cached_property
     def is_car(self) -> bool:
@@ -175,7 +173,5 @@ class PlacingScene:
         """Ways of a disc around everything, static or not."""
         static = self.world.static
         parts = [p for j in range(len(self.movables)) for p in self.movables.parts_world(j)]
-        solid = StaticMap(
-            (*static.polygons, *parts), static.segments, static.radii, static.bounds
-        )
+        solid = StaticMap((*static.polygons, *parts), static.segments, static.radii, static.bounds)
         return VisibilityGraph(solid, clearance)
