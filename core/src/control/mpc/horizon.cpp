@@ -44,6 +44,18 @@ Twist CommandLimits::nearest(const Twist& wanted, const Twist& last, double held
   return command;
 }
 
+Twist CommandLimits::at_end(const ReferencePath& track, double heading, double held) const {
+  if (std::isnan(track.last_heading)) return {0.0, 0.0};
+  const double left = wrap_angle(track.last_heading - heading);
+  const double slowing = max_turn_acceleration * held;
+  // a turn rate that falls to 0 within what is left, as commands are held for their time
+  const double most = std::isfinite(slowing)
+                          ? std::hypot(0.5 * slowing, std::sqrt(2.0 * max_turn_acceleration *
+                                                                std::abs(left))) - 0.5 * slowing
+                          : max_turn_rate;
+  return {0.0, std::copysign(std::min({most, std::abs(left) / held, max_turn_rate}), left)};
+}
+
 double CommandLimits::turn_from() const {
   const bool on_the_spot = !constant && turning_radius == 0.0;
   return on_the_spot ? kTurnStopped : kTurnDriving;
