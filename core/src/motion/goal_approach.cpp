@@ -20,6 +20,7 @@ constexpr double kInPlace = 0.999;  // distance from a goal at which the robot o
 constexpr double kRoom = 1.1;       // free disc in which a robot turns [circumscribed radii]
 constexpr double kRunUp = 12.0;     // longest straight way into a goal [circumscribed radii]
 constexpr double kRunUpStep = 0.25;
+constexpr double kMostPoses = 1e6;  // of an end
 
 /// A way to the goal from a pose of the path.
 struct Curve {
@@ -102,6 +103,7 @@ std::optional<PathEnd> path_end(const GoalRegion& goal, std::span<const Pose> pa
     for (const Arc& arc : curve.arcs) {
       steps += std::abs(arc.length) / step_along(arc.curvature, turns.spacing) + 1.0;
     }
+    if (!(steps < kMostPoses)) return false;
     end.poses.resize(static_cast<std::size_t>(steps) + 1);
     end.curvatures.resize(end.poses.size());
     const Index count = sample_arcs(start, curve.arcs, turns.spacing, {end.poses, end.curvatures});
@@ -114,9 +116,10 @@ std::optional<PathEnd> path_end(const GoalRegion& goal, std::span<const Pose> pa
     if (on_spot && !turns.on_spot) continue;
     for (const std::span<const double> back : {std::span<const double>(kNear), {kFar}}) {
       for (Curve& curve : curves_from(back, path, along, begin, turns, on_spot, near)) {
-        double turned = path[static_cast<std::size_t>(curve.from)].theta;
+        double turned = 0.0;
         for (const Arc& arc : curve.arcs) turned += arc.length * arc.curvature;
-        const double angle = std::remainder(goal.heading - turned, 2.0 * std::numbers::pi);
+        const double arrived = path[static_cast<std::size_t>(curve.from)].theta + turned;
+        const double angle = std::remainder(goal.heading - arrived, 2.0 * std::numbers::pi);
         const std::size_t arcs = curve.arcs.size();
         // the shorter way, and the longer one
         for (const double turn : {angle, angle - std::copysign(2.0 * std::numbers::pi, angle)}) {
