@@ -178,9 +178,9 @@ void bind_problems(nb::module_& module) {
             if (price != nullptr) self->price = *price;
           },
           "robot_mass"_a, "push_weight"_a, "turning_radius"_a, "spacing"_a, "jam_length"_a,
-          "displacement"_a, "goal"_a.noconvert(), "footprint"_a, "walls"_a,
-          "price"_a = nb::none(), "reverses"_a = false, "slides"_a = false,
-          nb::keep_alive<1, 9>(), nb::keep_alive<1, 10>(), nb::keep_alive<1, 11>());
+          "displacement"_a, "goal"_a.noconvert(), "footprint"_a, "walls"_a, "price"_a = nb::none(),
+          "reverses"_a = false, "slides"_a = false, nb::keep_alive<1, 9>(), nb::keep_alive<1, 10>(),
+          nb::keep_alive<1, 11>());
   nb::class_<SweptPath>(module, "SweptPath", "A path with the objects that it sweeps.")
       .def(
           "__init__",

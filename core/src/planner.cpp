@@ -138,8 +138,8 @@ class PlanningCall {
   double best_cost_ = kInfinity;
 };
 
-/// Sets where searches lead: into the goal, or near the place from which a path ends at its heading,
-/// which is the pose itself, or where a straight way into it begins.
+/// Sets where searches lead: into the goal, or near the place from which a path ends at its
+/// heading, which is the pose itself, or where a straight way into it begins.
 void PlanningCall::set_goal() {
   problem_.goal = path_goal_ = scene_.goal(kInset * size_);
   const GoalRegion& goal = scene_.world.goal;

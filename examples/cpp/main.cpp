@@ -1,4 +1,5 @@
-// Plans through a room with two boxes to a pose, and follows the plan at 100 Hz with both controllers.
+// Plans through a room with two boxes to a pose, and follows the plan at 100 Hz with both
+// controllers.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -43,7 +44,8 @@ pushplan::Pose drive(const pushplan::Pose& pose, const pushplan::mpc::Twist& twi
 }
 
 /// Follows a plan to its end. `command(pose, time)` is asked every period. True if the robot
-/// arrives at the goal and its heading, nothing was allocated on the way, and a pose that is none stops it.
+/// arrives at the goal and its heading, nothing was allocated on the way, and a pose that is none
+/// stops it.
 template <class Command>
 bool follow(const char* name, const pushplan::World& world, const pushplan::Plan& plan,
             Command&& command) {

@@ -73,9 +73,9 @@ void add_chords(std::span<const Vec2> outline, std::span<std::vector<Chord>> lin
   }
 }
 
-/// Closes the sides along lines that chords cover together, where two of them overlap surely. Side i
-/// of a line goes from i to i + 1, and `sides` has `across` for each line and `along` between them.
-/// No path goes below 0 or beyond `extent` along a line.
+/// Closes the sides along lines that chords cover together, where two of them overlap surely. Side
+/// i of a line goes from i to i + 1, and `sides` has `across` for each line and `along` between
+/// them. No path goes below 0 or beyond `extent` along a line.
 void cover(std::span<std::vector<Chord>> lines, double extent, Index along, Index across,
            std::span<std::uint8_t> sides) {
   const Index count = floor_index(extent) + 1;

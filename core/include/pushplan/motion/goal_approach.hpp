@@ -28,8 +28,9 @@ struct PathEnd {
 /// The pose from which a straight way of some length [m] leads into the pose of a goal.
 Pose behind(const GoalRegion& goal, double length);
 
-/// The shortest straight way into the pose of a goal from where the robot, of a circumscribed radius
-/// [m], has room to turn [m], negative for back; 0 where there is room at the goal, or no such way.
+/// The shortest straight way into the pose of a goal from where the robot, of a circumscribed
+/// radius [m], has room to turn [m], negative for back; 0 where there is room at the goal, or no
+/// such way.
 double run_up(const GoalRegion& goal, const EndTurns& turns, double size,
               CollisionChecker& checker);
 

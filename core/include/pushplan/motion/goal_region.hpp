@@ -17,7 +17,7 @@ struct GoalRegion {
   Vec2 normal{};        // of a line, unit, towards the goal
   double radius = 0.0;  // of a disc [m]
   double heading = std::numeric_limits<double>::quiet_NaN();  // to face in a disc [rad], if any
-  bool turns = false;  // paths turn to it on the spot; else they curve into it
+  bool turns = false;               // paths turn to it on the spot; else they curve into it
   double heading_tolerance = 0.05;  // to either side [rad]
 
   bool has_heading() const { return !std::isnan(heading); }

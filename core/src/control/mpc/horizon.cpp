@@ -48,12 +48,13 @@ Twist CommandLimits::at_end(const ReferencePath& track, double heading, double h
   if (std::isnan(track.last_heading)) return {0.0, 0.0};
   const double left = wrap_angle(track.last_heading - heading);
   const double slowing = max_turn_acceleration * held;
-  // a turn rate that falls to 0 within what is left, as commands are held for their time
-  const double most = std::isfinite(slowing)
-                          ? std::hypot(0.5 * slowing, std::sqrt(2.0 * max_turn_acceleration *
-                                                                std::abs(left))) - 0.5 * slowing
-                          : max_turn_rate;
-  return {0.0, std::copysign(std::min({most, std::abs(left) / held, max_turn_rate}), left)};
+  double most = std::min(max_turn_rate, std::abs(left) / held);
+  if (std::isfinite(slowing)) {  // so that it falls to 0 within what is left
+    const double half = 0.5 * slowing;
+    const double square = half * half + 2.0 * max_turn_acceleration * std::abs(left);
+    most = std::min(most, std::sqrt(square) - half);
+  }
+  return {0.0, std::copysign(most, left)};
 }
 
 double CommandLimits::turn_from() const {
