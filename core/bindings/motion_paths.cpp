@@ -1,11 +1,13 @@
 // Paths that push: collision checks, problems, rollouts, and searches for a way out.
 #include <nanobind/stl/pair.h>
+#include <nanobind/stl/tuple.h>
 
 #include "arrays.hpp"
 #include "goal.hpp"
 #include "pushplan/motion/arc_rollout.hpp"
 #include "pushplan/motion/coarse_path.hpp"
 #include "pushplan/motion/collision.hpp"
+#include "pushplan/motion/goal_approach.hpp"
 #include "pushplan/motion/random_tree/steering.hpp"
 #include "pushplan/motion/recovery.hpp"
 #include "pushplan/motion/room_ahead.hpp"
@@ -72,6 +74,28 @@ void bind_collision(nb::module_& module) {
       .def(
           "depth", [](CollisionChecker& self, const OnePose& at) { return self.depth(pose(at)); },
           "pose"_a.noconvert());
+  nb::class_<EndTurns>(module, "EndTurns", "How a robot turns at the end of a path.")
+      .def(nb::init<bool, bool, double, double>(), "on_spot"_a, "reverses"_a, "radius"_a,
+           "spacing"_a);
+  module.def(
+      "run_up",
+      [](const Numbers<5>& goal, const EndTurns& turns, double size, CollisionChecker& checker) {
+        return run_up(goal_region(goal), turns, size, checker);
+      },
+      "goal"_a.noconvert(), "turns"_a, "size"_a, "checker"_a);
+  module.def(
+      "path_end",
+      [](const Numbers<5>& goal, const Poses& path, const EndTurns& turns, double straight,
+         CollisionChecker& checker) {
+        require_room("path", path.shape(0), 1);
+        std::optional<PathEnd> end =
+            path_end(goal_region(goal), poses(path), turns, straight, checker);
+        if (!end) end = PathEnd{0, {}, {}};
+        return std::tuple(end->kept, copied_rows<double>(std::span<const Pose>(end->poses)),
+                          copied(std::span<const double>(end->curvatures)));
+      },
+      "goal"_a.noconvert(), "path"_a.noconvert(), "turns"_a, "straight"_a, "checker"_a,
+      "Poses kept (0 for none), and the poses and curvatures after them.");
 }
 
 /// Requires a path of `count` poses among the objects of a model, of which `first` is one.
@@ -154,9 +178,9 @@ void bind_problems(nb::module_& module) {
             if (price != nullptr) self->price = *price;
           },
           "robot_mass"_a, "push_weight"_a, "turning_radius"_a, "spacing"_a, "jam_length"_a,
-          "displacement"_a, "goal"_a.noconvert(), "footprint"_a, "walls"_a,
-          "price"_a = nb::none(), "reverses"_a = false, "slides"_a = false,
-          nb::keep_alive<1, 9>(), nb::keep_alive<1, 10>(), nb::keep_alive<1, 11>());
+          "displacement"_a, "goal"_a.noconvert(), "footprint"_a, "walls"_a, "price"_a = nb::none(),
+          "reverses"_a = false, "slides"_a = false, nb::keep_alive<1, 9>(), nb::keep_alive<1, 10>(),
+          nb::keep_alive<1, 11>());
   nb::class_<SweptPath>(module, "SweptPath", "A path with the objects that it sweeps.")
       .def(
           "__init__",

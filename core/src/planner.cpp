@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "planner_scene.hpp"
+#include "pushplan/motion/goal_approach.hpp"
 #include "pushplan/motion/shortcutting.hpp"
 #include "pushplan/motion/speed_profile.hpp"
 #include "pushplan/planners/push_aware/best_first.hpp"
@@ -20,6 +21,7 @@ namespace {
 // Many of these are those of the planners in Python, which say why. R: the robot's size.
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kInset = 0.05;          // depth in the goal at which a plan ends [R]
+constexpr double kNear = 0.5;            // tolerance of that place [that of the goal, or R]
 constexpr double kSpacing = 0.15;        // distance between the poses of a path [R]
 constexpr double kLeastSpacing = 0.02;   // the same where the margin is thin [R]
 constexpr double kTightest = 0.1;        // least turning radius that plans use [R]
@@ -91,6 +93,16 @@ class PlanningCall {
   bool solved() const { return best_cost_ < kInfinity; }
 
   bool set_margin(double margin);
+  void set_goal();
+  bool end_at_goal(OwnPath& path, Index& count);
+  EndTurns end_turns() const {
+    return {robot_.drive == Drive::kDifferential, false, problem_.turning_radius, problem_.spacing};
+  }
+  PathProblem path_problem() const {  // of whole paths; searches lead to where their ends begin
+    PathProblem whole = problem_;
+    whole.goal = path_goal_;
+    return whole;
+  }
   void set_radius(double radius) { problem_.turning_radius = std::max(radius, kTightest * size_); }
   void find_coarse_path(const CostToGo& table);
   GrowthDraw draw_growth(double bound);
@@ -113,6 +125,8 @@ class PlanningCall {
   bool stopped_ = false;
   Outlines footprint_;
   PathProblem problem_{};
+  GoalRegion path_goal_;
+  double straight_ = 0.0;  // length of the way into the pose of the goal [m]
   std::vector<Pose> coarse_path_;
   double to_go_ = kInfinity;  // length to the goal without objects [m]
   double detour_ = kDetour;
@@ -124,12 +138,48 @@ class PlanningCall {
   double best_cost_ = kInfinity;
 };
 
-/// Keeps a margin from walls [R]. False if the robot is nearer to one.
+/// Sets where searches lead: into the goal, or near the place from which a path ends at its
+/// heading, which is the pose itself, or where a straight way into it begins.
+void PlanningCall::set_goal() {
+  problem_.goal = path_goal_ = scene_.goal(kInset * size_);
+  const GoalRegion& goal = scene_.world.goal;
+  if (!goal.has_heading()) return;
+  CollisionChecker checker({scene_.robot.polygons(), size_}, problem_.walls);
+  straight_ = run_up(goal, end_turns(), size_, checker);
+  const Pose begin = behind(goal, straight_);
+  const double near = kNear * (straight_ == 0.0 ? goal.radius : size_);
+  problem_.goal = {GoalRegion::Kind::kDisc, {begin.x, begin.y}, {}, std::max(near, size_)};
+  path_goal_ = problem_.goal;
+  path_goal_.radius = near;
+  path_goal_.heading = goal.heading;
+  path_goal_.turns = end_turns().on_spot && straight_ == 0.0;
+}
+
+/// Gives a path an end at the heading of the goal; false where there is none.
+bool PlanningCall::end_at_goal(OwnPath& path, Index& count) {
+  CollisionChecker checker(problem_.footprint, problem_.walls);
+  const std::span<const Pose> poses = std::span(path.poses).first(static_cast<std::size_t>(count));
+  const auto end = path_end(scene_.world.goal, poses, end_turns(), straight_, checker);
+  if (!end) return false;
+  const auto kept = static_cast<std::size_t>(end->kept);
+  OwnPath other(3 * (kept + end->poses.size()) + 200, scene_.poses.size());
+  std::ranges::copy(poses.first(kept), other.poses.begin());
+  std::ranges::copy(std::span(path.curvatures).first(kept), other.curvatures.begin());
+  std::ranges::copy(end->poses, other.poses.begin() + end->kept);
+  std::ranges::copy(end->curvatures, other.curvatures.begin() + end->kept);
+  count = end->kept + static_cast<Index>(end->poses.size());
+  path = std::move(other);
+  return true;
+}
+
+/// Keeps a margin from walls [R]. False if the robot, or the pose of its goal, is nearer to one.
 bool PlanningCall::set_margin(double margin) {
   footprint_ = scene_.footprint(margin * size_);
   problem_.footprint = {footprint_.polygons(), footprint_.radius()};
   problem_.spacing = std::min(kSpacing, std::max(2.0 * margin, kLeastSpacing)) * size_;
-  return CollisionChecker(problem_.footprint, problem_.walls).is_free(start_);
+  CollisionChecker checker(problem_.footprint, problem_.walls);
+  const GoalRegion& goal = scene_.world.goal;
+  return checker.is_free(start_) && (!goal.has_heading() || checker.is_free(behind(goal, 0.0)));
 }
 
 Plan PlanningCall::run() {
@@ -141,18 +191,19 @@ Plan PlanningCall::run() {
   problem_.push_weight = options_.push_weight;
   problem_.jam_length = kBeyond * around * load;
   problem_.displacement = 1.5 * size_;
-  problem_.goal = scene_.goal(kInset * size_);
   problem_.walls = scene_.obstacles();
   set_radius(robot_.drive == Drive::kDifferential ? size_
                                                   : scene_.turning_radius / options_.turn_fraction);
   constexpr std::array<double, 5> kParts{1.0, 0.5, 0.25, 0.1, 0.0};  // of the margin
   if (std::ranges::none_of(kParts, [&](double p) { return set_margin(p * options_.margin); })) {
+    if (CollisionChecker(problem_.footprint, problem_.walls).is_free(start_)) {
+      return {PlanStatus::kNoPlan, "the pose of the goal overlaps a wall, or is out of the bounds"};
+    }
     return {PlanStatus::kStartBlocked, "the robot overlaps a wall, or is out of the bounds"};
   }
-  if (scene_.world.goal.contains({start_.x, start_.y})) {
-    try_arcs({});
-    return finish();
-  }
+  set_goal();
+  if (scene_.world.goal.contains({start_.x, start_.y})) try_arcs({});
+  if (solved()) return finish();
   const bool push_aware = options_.search == SearchKind::kPushAware;
   const Footprint bare{scene_.robot.polygons(), size_};
   CostToGoMaker maker(bare, problem_.walls, problem_.goal, size_, problem_.turning_radius,
@@ -278,9 +329,13 @@ void PlanningCall::try_arcs(const std::vector<Arc>& arcs) {
   }
   if (!(capacity < kMostPoses)) return;
   OwnPath path(static_cast<std::size_t>(capacity), scene_.poses.size());
-  PricedPath priced{lay_out(start_, arcs, path.view(), problem_), 0.0};
+  const PathProblem problem = path_problem();
+  PricedPath priced{lay_out(start_, arcs, path.view(), problem), 0.0};
+  const GoalRegion& goal = scene_.world.goal;
+  const bool there = arcs.empty() && goal.reached_by(start_);
+  if (goal.has_heading() && !there && !end_at_goal(path, priced.count)) return;
   std::ranges::copy(scene_.poses, path.objects.begin());
-  PathSweep<QuasiStatic> sweep(problem_, model_);
+  PathSweep<QuasiStatic> sweep(problem, model_);
   const double jam = problem_.jam_length * robot_.mass;
   const auto step = static_cast<Index>(batch_);
   for (Index first = 0; first + 1 < priced.count; first += step) {
@@ -293,6 +348,7 @@ void PlanningCall::try_arcs(const std::vector<Arc>& arcs) {
 }
 
 void PlanningCall::shortcut_path(OwnPath& path, PricedPath priced) {
+  const PathProblem problem = path_problem();
   OwnPath trial(path.poses.size(), scene_.poses.size());
   std::vector<ShortcutDraw> draws(batch_);
   std::vector<ShortcutShift> shifts(batch_);
@@ -303,7 +359,7 @@ void PlanningCall::shortcut_path(OwnPath& path, PricedPath priced) {
       if (stopped()) return;
       for (ShortcutDraw& draw : draws) draw = {uniform(), uniform(), uniform(), uniform()};
       for (ShortcutShift& shift : shifts) shift = {normal(), normal()};
-      priced = shortcut(path.view(), priced, draws, shifts, trial.view(), problem_, model_);
+      priced = shortcut(path.view(), priced, draws, shifts, trial.view(), problem, model_);
       iterations_ += static_cast<Index>(batch_);
       keep(path, priced);
     }
@@ -331,6 +387,7 @@ Plan PlanningCall::finish() const {
   found.objects = first(best_->objects, count * scene_.poses.size());
   found.travel_cost = robot_.mass * found.lengths.back();
   found.interaction_cost = best_->works[count - 1];
+  if (end_turns().on_spot) found.last_heading = scene_.world.goal.heading;
   std::vector<double> chords;
   for (std::size_t i = 1; i < count; ++i) chords.push_back(found.lengths[i] - found.lengths[i - 1]);
   const mpc::Twist& driven = scene_.world.robot_twist;
@@ -378,6 +435,13 @@ Plan plan(const World& world, const PlannerOptions& options) {
   } catch (...) {
     return {PlanStatus::kFailed, "the stop rule threw something that is no std::exception"};
   }
+}
+
+mpc::ReferencePath Plan::track() const {
+  std::size_t count = poses.size();
+  while (count > 1 && lengths[count - 1] == lengths[count - 2]) --count;  // without a last turn
+  return {std::span(poses).first(count), std::span(lengths).first(count),
+          std::span(speeds).first(count), last_heading};
 }
 
 PurePursuit make_pure_pursuit(const Robot& robot, const mpc::Twist& driven) {

@@ -44,9 +44,13 @@ bool is_convex(Polygon outline) {
 }
 
 bool is_goal(const GoalRegion& goal) {
-  if (!usable(goal.point) || goal.has_heading()) return false;
-  if (goal.kind == GoalRegion::Kind::kDisc) return positive(goal.radius);
-  return std::abs(std::hypot(goal.normal.x, goal.normal.y) - 1.0) < 1e-6;
+  if (!usable(goal.point)) return false;
+  const bool turns = usable(goal.heading) && positive(goal.heading_tolerance) &&
+                     goal.heading_tolerance <= std::numbers::pi;
+  if (goal.kind == GoalRegion::Kind::kDisc) {
+    return positive(goal.radius) && (turns || !goal.has_heading());
+  }
+  return !goal.has_heading() && std::abs(std::hypot(goal.normal.x, goal.normal.y) - 1.0) < 1e-6;
 }
 
 }  // namespace
@@ -76,7 +80,8 @@ std::string fault_of(const World& world, const PlannerOptions& options) {
       {std::ranges::all_of(world.objects, positive, &Object::mass),
        "masses of objects must be positive"},
       {is_goal(world.goal),
-       "goal must be a disc with a radius and no heading, or a line with a normal of length 1"},
+       "goal must be a disc with a radius, and a heading_tolerance in (0, pi] if it has a heading, "
+       "or a line with a normal of length 1 and no heading"},
       {not_negative(options.push_weight) && not_negative(options.friction) &&
            not_negative(options.static_friction),
        "push_weight, friction and static_friction must be 0 or more"},

@@ -82,10 +82,50 @@ void plans_fit_the_world() {
   CHECK(solved >= 22);
 }
 
+/// Poses as goals: a differential drive turns on the spot at the end, others curve into the pose.
+void plans_end_at_headings() {
+  Xorshift64Star random(15);
+  int solved = 0;
+  for (int trial = 0; trial < 12; ++trial) {
+    World world = random_room(random);
+    world.goal.radius = 0.02;
+    world.goal.point.x = 6.0;
+    world.goal.heading = between(random, -3.0, 3.0);
+    const bool turns = world.robot.drive == Drive::kDifferential;
+    for (const SearchKind search : kSearches) {
+      const Plan found = plan(world, {.search = search, .seed = 3, .iterations = 4'000});
+      if (found.status != PlanStatus::kSolved) continue;
+      ++solved;
+      CHECK(world.goal.reached_by(found.poses.back()) && is_free(world, found));
+      CHECK(found.poses[0] == world.robot_pose);
+      for (std::size_t i = 1; i < found.poses.size(); ++i) {
+        CHECK(found.times[i] > found.times[i - 1]);
+        const double turn = std::abs(found.poses[i].theta - found.poses[i - 1].theta);
+        const double moved = found.lengths[i] - found.lengths[i - 1];
+        CHECK(moved > 0.0 || (turns && turn <= 0.15 + 1e-9));
+        if (!turns) CHECK(turn * 0.4 <= moved + 1e-9);
+      }
+      CHECK(turns == !std::isnan(found.track().last_heading));
+    }
+  }
+  CHECK(solved >= 20);
+  World there = random_room(random);
+  there.robot.drive = Drive::kDifferential;
+  there.robot.turning_radius = 0.0;
+  there.goal.heading = there.robot_pose.theta + 3.0;
+  there.goal.point = {there.robot_pose.x, there.robot_pose.y};
+  const Plan turned = plan(there);  // it only turns
+  CHECK(turned.lengths.back() == 0.0 && there.goal.reached_by(turned.poses.back()));
+  there.goal.heading = there.robot_pose.theta + 0.04;
+  CHECK(plan(there).poses.size() == 1);
+  there.goal.point = {4.0, 0.2};
+  CHECK(plan(there).status == PlanStatus::kNoPlan);
+}
+
 void wrong_worlds_are_refused() {
   Xorshift64Star random(7);
   const World good = random_room(random);
-  std::vector<World> wrong(11, good);
+  std::vector<World> wrong(14, good);
   wrong[0].robot_pose.theta = kNaN;
   wrong[1].robot.parts.clear();
   wrong[2].robot.parts[0][1].x = kNaN;
@@ -97,6 +137,10 @@ void wrong_worlds_are_refused() {
   wrong[8].goal = {GoalRegion::Kind::kLine, {1.0, 1.0}, {0.5, 0.5}, 0.0};
   wrong[9].bounds.x_max = kNaN;
   wrong[10].robot.max_speed = std::numeric_limits<double>::infinity();
+  wrong[11].goal.heading = std::numeric_limits<double>::infinity();
+  wrong[12].goal.heading = 1.0;
+  wrong[12].goal.heading_tolerance = 0.0;
+  wrong[13].goal = {GoalRegion::Kind::kLine, {1.0, 1.0}, {1.0, 0.0}, 0.0, 1.0};
   for (const World& world : wrong) {
     const Plan found = plan(world);
     CHECK(found.status == PlanStatus::kInvalidInput && !found.message.empty());
@@ -167,6 +211,7 @@ void pure_pursuit_arrives() {
 int main() {
   pushplan::large_maps_end();
   pushplan::plans_fit_the_world();
+  pushplan::plans_end_at_headings();
   pushplan::wrong_worlds_are_refused();
   pushplan::stop_rules_end_calls();
   pushplan::pure_pursuit_arrives();

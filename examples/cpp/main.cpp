@@ -1,4 +1,5 @@
-// Plans through a room with two boxes, and follows the plan at 100 Hz with both controllers.
+// Plans through a room with two boxes to a pose, and follows the plan at 100 Hz with both
+// controllers.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -30,7 +31,8 @@ pushplan::World room() {
   world.robot_pose = {1.0, 1.0, 0.0};
   world.walls = {rectangle(3.9, 0.0, 4.1, 1.2), rectangle(3.9, 2.6, 4.1, 4.0)};
   world.objects = {{rectangle(3.8, 1.7, 4.2, 2.1), 3.0}, {rectangle(5.8, 1.8, 6.2, 2.2), 3.0}};
-  world.goal = {pushplan::GoalRegion::Kind::kDisc, {7.0, 3.0}, {}, 0.3};
+  world.goal = {pushplan::GoalRegion::Kind::kDisc, {7.0, 3.0}, {}, 0.1};
+  world.goal.heading = 1.57;
   world.bounds = {0.0, 0.0, 8.0, 4.0};
   return world;
 }
@@ -42,7 +44,8 @@ pushplan::Pose drive(const pushplan::Pose& pose, const pushplan::mpc::Twist& twi
 }
 
 /// Follows a plan to its end. `command(pose, time)` is asked every period. True if the robot
-/// arrives in the goal, nothing was allocated on the way, and a pose that is none stops it.
+/// arrives at the goal and its heading, nothing was allocated on the way, and a pose that is none
+/// stops it.
 template <class Command>
 bool follow(const char* name, const pushplan::World& world, const pushplan::Plan& plan,
             Command&& command) {
@@ -50,7 +53,7 @@ bool follow(const char* name, const pushplan::World& world, const pushplan::Plan
   const pushplan::Pose& end = plan.poses.back();
   const long before = allocations;
   int step = 0;
-  while (step < kSteps && !world.goal.contains({pose.x, pose.y})) {
+  while (step < kSteps && !world.goal.reached_by(pose)) {
     pose = drive(pose, command(pose, kPeriod * step));
     ++step;
   }
@@ -59,7 +62,7 @@ bool follow(const char* name, const pushplan::World& world, const pushplan::Plan
   for (int i = 0; i < 200; ++i) {  // it brakes as its limits allow
     last = command({kNaN, pose.y, pose.theta}, kPeriod * ++step);
   }
-  const bool arrived = world.goal.contains({pose.x, pose.y});
+  const bool arrived = world.goal.reached_by(pose);
   const bool stopped = last.v == 0.0 && last.w == 0.0;
   const long allocated = allocations - before;
   std::printf("  %s: %s after %.1f s, %.2f m from the plan's end, %ld allocations, %s\n", name,

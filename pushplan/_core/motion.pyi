@@ -107,6 +107,16 @@ class CollisionChecker:
 
     def depth(self, pose: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C', device='cpu', writable=False)]) -> float: ...
 
+class EndTurns:
+    """How a robot turns at the end of a path."""
+
+    def __init__(self, on_spot: bool, reverses: bool, radius: float, spacing: float) -> None: ...
+
+def run_up(goal: Annotated[NDArray[numpy.float64], dict(shape=(5), order='C', device='cpu', writable=False)], turns: EndTurns, size: float, checker: CollisionChecker) -> float: ...
+
+def path_end(goal: Annotated[NDArray[numpy.float64], dict(shape=(5), order='C', device='cpu', writable=False)], path: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu', writable=False)], turns: EndTurns, straight: float, checker: CollisionChecker) -> tuple[int, Annotated[NDArray[numpy.float64], dict(shape=(None, None))], Annotated[NDArray[numpy.float64], dict(shape=(None,))]]:
+    """Poses kept (0 for none), and the poses and curvatures after them."""
+
 class PriceGrid:
     """Prices of places."""
 

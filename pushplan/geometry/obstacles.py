@@ -21,8 +21,9 @@ from pushplan.world.outline import flatten, outline_boxes
 @lru_cache(maxsize=64)
 def obstacles_of(static: StaticMap, clearance: float = 0.0) -> core.Obstacles:
     """The cores of a static map, grown by ``clearance`` [m]; kept for the maps used last."""
-    cores = [*static.polygons, *(line.reshape(2, 2) for line in static.segments)]
-    vertices, offsets = flatten(cores)
+    vertices, offsets = static.packed
+    if len(static.segments):
+        vertices, offsets = flatten([*static.polygons, *static.segments.reshape(-1, 2, 2)])
     radii = np.concatenate([np.zeros(len(static.polygons)), static.radii]) + clearance
     boxes = outline_boxes(vertices, offsets) + radii[:, None] * [-1.0, -1.0, 1.0, 1.0]
     return core.Obstacles(vertices, offsets, frozen(radii), frozen(boxes))

@@ -22,7 +22,7 @@ from pushplan.world.checked_fields import (
     PositiveInt,
 )
 from pushplan.world.checks import FloatArray, expect, frozen
-from pushplan.world.outline import flatten, outline_boxes, unflatten
+from pushplan.world.outline import unflatten
 
 _TOLERANCE = 1e-3  # overlap that counts as resolved [sizes of the thinnest body]
 _MOST_SLENDER = 30.0
@@ -155,7 +155,7 @@ def inverse_gyration(movables: Movables) -> FloatArray:
 @functools.lru_cache(maxsize=32)
 def _bodies(robot: RobotModel, shapes: _Shapes, static: StaticMap, gyration: float) -> core.Bodies:
     movables = shapes.movables
-    vertices, offsets = flatten(static.convex_parts)
+    vertices, offsets = static.packed
     return core.Bodies(
         robot_vertices=robot.vertices,
         robot_offsets=robot.offsets,
@@ -171,5 +171,5 @@ def _bodies(robot: RobotModel, shapes: _Shapes, static: StaticMap, gyration: flo
         inverse_gyration=1.0 / (_gyration(shapes) * gyration**2),
         wall_vertices=vertices,
         wall_offsets=offsets,
-        wall_boxes=outline_boxes(vertices, offsets),
+        wall_boxes=static.boxes,
     )

@@ -19,6 +19,7 @@ from pushplan.world.outline import flatten, outline_boxes
 _SIDE = 96  # cells along the longer side of the workspace, if that resolves the robot's own width
 _MOST = 400  # cells along the longer side at most
 _PIECE = 300  # walls between two looks at a stop rule
+_PIECE_CELLS = 50_000  # the same of the cells that they cover
 
 
 def _cell(world: World) -> float:
@@ -90,6 +91,11 @@ class _WallWeights:
         self._made = [_no_weights(static.bounds, cell) for _ in terms]
         self._done = 0
         self._lock = threading.Lock()
+        reach = max(away for away, _ in terms)
+        low = np.maximum(static.boxes[:, :2] - reach, static.bounds[:2])
+        high = np.minimum(static.boxes[:, 2:] + reach, static.bounds[2:])
+        cells = (np.maximum(high - low, 0.0) / cell).prod(axis=1)
+        self._cells = np.append(0.0, np.cumsum(cells))  # of the parts before each
 
     def make(self, stopped: Callable[[], bool]) -> FloatArray | None:
         """Go on until all is done, or ``stopped``, asked every few milliseconds, says so: None."""
@@ -98,7 +104,10 @@ class _WallWeights:
             if stopped():
                 return None
             with self._lock:
-                some = parts[self._done : self._done + _PIECE]
+                most = self._cells[self._done] + _PIECE_CELLS
+                last = int(np.searchsorted(self._cells, most, "right")) - 1
+                last = min(max(last, self._done + 1), self._done + _PIECE)
+                some = parts[self._done : last]
                 for (reach, weight), made in zip(self._terms, self._made, strict=True):
                     full = np.full(len(some), reach), np.full(len(some), weight)
                     _add_weights(made, self._static.bounds, self._cell, some, *full)

@@ -10,7 +10,7 @@ from shapely import Polygon
 
 from pushplan.core import motion as core
 from pushplan.world import RobotModel, StaticMap
-from pushplan.world.checks import FloatArray
+from pushplan.world.checks import FloatArray, IntArray
 from pushplan.world.outline import convex_outline, flatten, outline_boxes
 
 GROUP = 16
@@ -41,30 +41,36 @@ def obstacles(
     """
     if not outlines and bounds is None:
         return _walls(static)
-    parts = [*static.convex_parts, *outlines]
-    return _obstacles(parts, static.bounds if bounds is None else bounds)
+    vertices, offsets = flatten([*static.convex_parts, *outlines])
+    boxes = outline_boxes(vertices, offsets)
+    return _obstacles(vertices, offsets, boxes, static.bounds if bounds is None else bounds)
 
 
 @functools.lru_cache(maxsize=32)
 def _walls(static: StaticMap) -> core.ConvexObstacles:
-    return _obstacles(static.convex_parts, static.bounds)
+    return _obstacles(*static.packed, static.boxes, static.bounds)
 
 
-def _obstacles(parts: Sequence[FloatArray], bounds: FloatArray) -> core.ConvexObstacles:
-    if len(parts) > GROUP:
-        parts = [parts[k] for k in _packed(np.array([part[0] for part in parts]))]
-    vertices, offsets = flatten(parts)
-    boxes = outline_boxes(vertices, offsets)
+def _obstacles(
+    vertices: FloatArray, offsets: IntArray, boxes: FloatArray, bounds: FloatArray
+) -> core.ConvexObstacles:
+    if len(boxes) > GROUP:
+        order = _packed(vertices[offsets[:-1]])
+        sizes = np.diff(offsets)[order]
+        starts = offsets[order]
+        offsets = np.concatenate([[0], np.cumsum(sizes)])
+        vertices = vertices[np.repeat(starts - offsets[:-1], sizes) + np.arange(offsets[-1])]
+        boxes = boxes[order]
     groups = np.zeros((0, 4))
-    if len(parts):
-        first = np.arange(0, len(parts), GROUP)
+    if len(boxes):
+        first = np.arange(0, len(boxes), GROUP)
         groups = np.hstack(
             [np.minimum.reduceat(boxes[:, :2], first), np.maximum.reduceat(boxes[:, 2:], first)]
         )
     return core.ConvexObstacles(vertices, offsets, boxes, np.ascontiguousarray(groups), bounds)
 
 
-def _packed(places: FloatArray) -> list[int]:
+def _packed(places: FloatArray) -> IntArray:
     """An order of places (S, 2) in which groups lie near each other, as in a packed R-tree.
 
     Leutenegger, Lopez and Edgington, "STR: a simple and efficient algorithm for R-tree packing",
@@ -74,5 +80,4 @@ def _packed(places: FloatArray) -> list[int]:
     slices = int(np.ceil(np.sqrt(len(places) / GROUP)))
     size = GROUP * int(np.ceil(len(places) / (slices * GROUP)))
     rank = np.argsort(by_x)
-    order: list[int] = np.lexsort((places[:, 1], rank // size)).tolist()
-    return order
+    return np.lexsort((places[:, 1], rank // size))

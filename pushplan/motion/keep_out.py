@@ -12,7 +12,6 @@ from pushplan.world.outline import (
     flatten,
     grown_outline,
     grown_outlines,
-    outline_boxes,
     transform,
     unflatten,
 )
@@ -35,7 +34,7 @@ def keep_out(world: World) -> StaticMap:
         return static
     outlines = [transform(world.robot_pose, part) for part in world.robot.wall_parts]
     reach = world.robot.circumscribed_radius + 2.0 * margin
-    boxes = _boxes(static)
+    boxes = static.boxes
     at = world.robot_pose[:2]
     near = ((boxes[:, :2] < at + reach) & (boxes[:, 2:] > at - reach)).all(axis=1)
     fractions = []
@@ -59,12 +58,6 @@ def _grown(static: StaticMap, margin: float, fractions: tuple[tuple[int, int], .
     outlines = grown_outlines(*flatten(static.polygons), margins[:count])
     radii = static.radii + margins[count:]
     return StaticMap(unflatten(*outlines), static.segments, radii, static.bounds)
-
-
-@functools.lru_cache(maxsize=32)
-def _boxes(static: StaticMap) -> FloatArray:
-    """(S, 4) boxes around all obstacles [m]."""
-    return outline_boxes(*flatten(static.convex_parts))
 
 
 def _grown_part(static: StaticMap, k: int, margin: float) -> FloatArray:

@@ -13,8 +13,8 @@ from pushplan.geometry import geodesic_field
 from pushplan.geometry.shadows import BendDistances, bend_distances
 from pushplan.observation.view import Image, View
 from pushplan.world import Goal, StaticMap
-from pushplan.world.checks import FloatArray, IntArray, frozen
-from pushplan.world.outline import flatten, transform
+from pushplan.world.checks import FloatArray, frozen
+from pushplan.world.outline import transform
 
 
 def draw_ray(image: Image, x: float, y: float, dx: float, dy: float, value: int) -> None:
@@ -148,12 +148,7 @@ def _fill_movables(image: Image, view: View, value: int) -> None:
 
 
 def _fill_static(image: Image, view: View) -> None:
-    core.fill_parts(image, view.numbers, *_static_parts(view.world.static), 255)
-
-
-@functools.lru_cache(maxsize=16)
-def _static_parts(static_map: StaticMap) -> tuple[FloatArray, IntArray]:
-    return flatten(static_map.convex_parts)
+    core.fill_parts(image, view.numbers, *view.world.static.packed, 255)
 
 
 def _eye(view: View) -> tuple[float, float]:

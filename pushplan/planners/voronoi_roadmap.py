@@ -28,7 +28,7 @@ from pushplan.world import (
     World,
 )
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, number
-from pushplan.world.outline import flatten, next_corner
+from pushplan.world.outline import next_corner
 from pushplan.world.planning_call import PlanningCall
 
 _MOST_SITES = 2000
@@ -243,7 +243,7 @@ def _clear_of_walls(
 def _outlines(world: World) -> tuple[FloatArray, IntArray]:
     """(V, 2) corners of all objects, then of all obstacles [m], and how many each has."""
     floes = world.movables
-    (vertices, offsets) = flatten(keep_out(world).convex_parts)
+    vertices, offsets = keep_out(world).packed
     counts = np.concatenate([np.diff(floes.part_offsets), np.diff(offsets)])
     return np.concatenate([floes.part_vertices_world, vertices]), counts
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -69,9 +70,14 @@ def disjoint(parts: ConvexParts) -> ConvexParts:
     """Convex pieces that do not overlap, with the union of some convex parts."""
     if len(parts) == 1:
         return parts
+    return _pieces(tuple(part.tobytes() for part in parts))
+
+
+@lru_cache(maxsize=4_000)  # of a few large ice fields, a millisecond each
+def _pieces(corners: tuple[bytes, ...]) -> ConvexParts:
     from pushplan.world.outline_repair import disjoint_pieces
 
-    return disjoint_pieces(parts)
+    return disjoint_pieces(tuple(np.frombuffer(part).reshape(-1, 2) for part in corners))
 
 
 def rings_of(parts: ConvexParts) -> tuple[FloatArray, ...]:

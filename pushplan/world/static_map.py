@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 
 from pushplan.errors import InvalidInputError
 from pushplan.world.checked_fields import CheckedFields, Shape
-from pushplan.world.checks import ArrayRecord, FloatArray, array, checked_bounds, frozen
+from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, array, checked_bounds, frozen
 from pushplan.world.convex_shapes import shapes_of
 from pushplan.world.occupancy_grid import occupancy_polygons, occupied_cells
-from pushplan.world.outline import listed
+from pushplan.world.outline import flatten, listed, outline_boxes
 
 CAP_CORNERS = 9
 """Corners of each half circle where a thick segment is turned into a polygon."""
@@ -141,6 +141,16 @@ class StaticMap(ArrayRecord, CheckedFields):
             for line, radius in zip(self.segments, self.radii, strict=True)
         ]
         return (*self.polygons, *ends)
+
+    @cached_property
+    def packed(self) -> tuple[FloatArray, IntArray]:
+        """(V, 2) corners of all convex parts [m], and (S + 1,) where each part starts."""
+        return flatten(self.convex_parts)
+
+    @cached_property
+    def boxes(self) -> FloatArray:
+        """(S, 4) boxes around the convex parts: x_min, y_min, x_max, y_max [m]."""
+        return frozen(outline_boxes(*self.packed))
 
 
 def _parts(polygons: Sequence[Any]) -> list[FloatArray]:

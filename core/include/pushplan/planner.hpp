@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -38,21 +39,23 @@ struct PlannerOptions {
 };
 
 /// Poses with times, the cheapest found by m0 l0 + w sum(mi li); empty without a plan. It leads
-/// ahead only. All arrays but `objects` are (N,).
+/// ahead only, and turns on the spot at the end. All arrays but `objects` are (N,).
 struct Plan {
   PlanStatus status = PlanStatus::kNoPlan;
   std::string message{};
   std::vector<double> times{};       // from the start [s]
   std::vector<Pose> poses{};         // of the robot
   std::vector<double> lengths{};     // path length so far [m]
-  std::vector<double> speeds{};      // from each pose on [m/s]
+  std::vector<double> speeds{};      // from each pose on [m/s]; 0 where the robot turns on the spot
   std::vector<double> turn_rates{};  // [rad/s]
   std::vector<Pose> objects{};       // (N, K) their predicted centroids, and turns since the start
   double travel_cost = 0.0;          // m0 l0 [kg m]
   double interaction_cost = 0.0;     // sum(mi li) [kg m]
+  /// Heading of the goal that a differential drive turns to at the end [rad], if it has one.
+  double last_heading = std::numeric_limits<double>::quiet_NaN();
 
   /// The path as controllers read it; the plan has to outlive it.
-  mpc::ReferencePath track() const { return {poses, lengths, speeds}; }
+  mpc::ReferencePath track() const;
 };
 
 /// The best plan found within the budget. It throws nothing, whatever the arguments are.

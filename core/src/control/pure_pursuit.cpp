@@ -49,6 +49,8 @@ mpc::Twist PurePursuit::follow(const mpc::ReferencePath& track, const Pose& pose
     place_ = std::min(place_, track.length());
     if (limits_.constant || place_ < track.length() - 1e-9) {
       wanted = pursue(track, pose, place_, lookahead_, limits_);
+    } else {
+      wanted = limits_.at_end(track, pose.theta, held);
     }
   }
   last_ = limits_.nearest(wanted, last_, held, true);

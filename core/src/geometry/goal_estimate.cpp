@@ -73,11 +73,11 @@ void add_chords(std::span<const Vec2> outline, std::span<std::vector<Chord>> lin
   }
 }
 
-/// Marks the sides along lines that chords cover together, where two of them overlap surely. Side i
-/// of a line goes from i to i + 1, and `sides` has `across` for each line and `along` between them.
-/// No path goes below 0 or beyond `extent` along a line.
+/// Closes the sides along lines that chords cover together, where two of them overlap surely. Side
+/// i of a line goes from i to i + 1, and `sides` has `across` for each line and `along` between
+/// them. No path goes below 0 or beyond `extent` along a line.
 void cover(std::span<std::vector<Chord>> lines, double extent, Index along, Index across,
-           std::vector<char>& sides) {
+           std::span<std::uint8_t> sides) {
   const Index count = floor_index(extent) + 1;
   for (std::size_t line = 0; line < lines.size(); ++line) {
     std::vector<Chord>& chords = lines[line];
@@ -91,7 +91,7 @@ void cover(std::span<std::vector<Chord>> lines, double extent, Index along, Inde
       const Index end =
           run.right >= extent ? count : std::min(count, floor_index(run.right - kMargin));
       for (Index i = begin; i < end; ++i) {
-        sides[at(static_cast<Index>(line) * across + i * along)] = 1;
+        sides[at(static_cast<Index>(line) * across + i * along)] = 0;
       }
     }
   }
@@ -113,8 +113,14 @@ CoveredSides::CoveredSides(Polygons outlines, const Box& box, double cell) {
   origin_ = {box.x_min, box.y_min};
   columns_ = floor_index(width / cell_) + 1;
   rows_ = floor_index(height / cell_) + 1;
-  std::vector<char> left(at(rows_ * columns_), 0);   // whether that side of a cell is covered
-  std::vector<char> below(at(rows_ * columns_), 0);  // and the one towards lower y
+  // whether the lower side of a cell in x, and the one in y, is open; with a closed frame around
+  const Index width_in = columns_ + 2;
+  std::vector<std::uint8_t> left(at((rows_ + 2) * width_in), 0);
+  std::vector<std::uint8_t> below = left;
+  for (Index row = 1; row <= rows_; ++row) {
+    std::fill_n(&left[at(row * width_in + 2)], columns_ - 1, std::uint8_t{1});
+    if (row > 1) std::fill_n(&below[at(row * width_in + 1)], columns_, std::uint8_t{1});
+  }
   std::vector<std::vector<Chord>> lines_of_x(at(columns_));
   std::vector<std::vector<Chord>> lines_of_y(at(rows_));
   std::vector<Vec2> corners;  // [cells]
@@ -128,26 +134,24 @@ CoveredSides::CoveredSides(Polygons outlines, const Box& box, double cell) {
     for (Vec2& corner : corners) std::swap(corner.x, corner.y);
     add_chords(corners, lines_of_x);
   }
-  cover(lines_of_y, width / cell_, 1, columns_, below);
-  cover(lines_of_x, height / cell_, columns_, 1, left);
-  moves_.assign(at(rows_ * columns_), 0);
-  const auto open = [&](int direction, Index from, Index to) {
-    moves_[at(from)] |= static_cast<std::uint8_t>(1 << direction);
-    moves_[at(to)] |= static_cast<std::uint8_t>(1 << (direction + 4));
-  };
-  for (Index here = 0; here < rows_ * columns_; ++here) {
-    if (here % columns_ > 0 && left[at(here)] == 0) open(0, here - 1, here);
-    if (here >= columns_ && below[at(here)] == 0) open(2, here - columns_, here);
-  }
-  for (Index here = 0; here < (rows_ - 1) * columns_; ++here) {  // one straight move and another
-    const Index above = here + columns_;
-    const bool up = leads(here, 2);
-    for (const int direction : {1, 3}) {
-      const int beside = 2 * direction - 2;
-      const Index side = direction == 1 ? 1 : -1;
-      if ((up && leads(above, beside)) || (leads(here, beside) && leads(here + side, 2))) {
-        open(direction, here, above + side);
-      }
+  const std::size_t inner = at(width_in + 1);  // the first cell within the frame
+  cover(lines_of_y, width / cell_, 1, width_in, std::span(below).subspan(inner));
+  cover(lines_of_x, height / cell_, width_in, 1, std::span(left).subspan(inner));
+  moves_.resize(at(rows_ * columns_));
+  for (Index row = 0; row < rows_; ++row) {  // of bytes alone, which compilers take by sixteen
+    std::uint8_t* const moves = &moves_[at(row * columns_)];
+    const std::uint8_t* const x = &left[inner + at(row * width_in)];
+    const std::uint8_t* const y = &below[inner + at(row * width_in)];
+    const std::uint8_t* const x_above = x + width_in;
+    const std::uint8_t* const y_above = y + width_in;
+    const std::uint8_t* const x_under = x - width_in;
+    for (Index i = 0; i < columns_; ++i) {  // one straight move and another make a slanting one
+      const int slants = ((y_above[i] & x_above[i + 1]) | (x[i + 1] & y_above[i + 1])) << 1 |
+                         ((y_above[i] & x_above[i]) | (x[i] & y_above[i - 1])) << 3 |
+                         ((y[i] & x_under[i]) | (x[i] & y[i - 1])) << 5 |
+                         ((y[i] & x_under[i + 1]) | (x[i + 1] & y[i + 1])) << 7;
+      moves[i] =
+          static_cast<std::uint8_t>(x[i + 1] | y_above[i] << 2 | x[i] << 4 | y[i] << 6 | slants);
     }
   }
 }

@@ -15,7 +15,6 @@ from pushplan.motion.state_lattice.frame import Frame
 from pushplan.motion.time_slicing import go_on, never
 from pushplan.world import Movables, StaticMap
 from pushplan.world.checks import FloatArray, IntArray
-from pushplan.world.outline import flatten
 
 _BLOCKED_MARGIN = 0.8
 """Cells nearer to an obstacle than this are blocked [cells]: more than half their diagonal."""
@@ -72,7 +71,7 @@ class LatticeMap:
         """Flattened sums of the blocked cells of each column before each row; (0,) without any."""
         if not static.convex_parts:
             return np.zeros(0)
-        vertices, offsets = flatten(static.convex_parts)
+        vertices, offsets = static.packed
         grid = np.zeros(self.shape)
         outlines = np.ascontiguousarray(self.to_cells(vertices))
         for first in range(0, len(offsets) - 1, _FEW):

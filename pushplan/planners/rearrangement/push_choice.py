@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import math
 import numbers
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -26,6 +27,7 @@ from pushplan.planners.rearrangement.push_graph import PushGraph, build_push_gra
 from pushplan.planners.rearrangement.push_order import sequence_pushes
 from pushplan.planners.rearrangement.push_scene import MARGIN, PushScene, pose_distance
 from pushplan.planners.rearrangement.push_simulator import resimulate
+from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.world import PendingResult, PlanningExecutor, Stop, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import path_length, path_lengths
@@ -37,6 +39,8 @@ _OBJECT_OFF = 0.2
 [circumscribed radii]."""
 _RECOVERY_S = 0.05
 """Time that a path out of a tight place takes, roughly [s]."""
+_FORGETTING = 0.9
+"""Factor on the longest time of a first push with its approach, at each further one."""
 _NEAREST = 2
 """For so many objects, the nearest ones, relocations are looked for at first."""
 
@@ -245,6 +249,7 @@ def _select(
     known: dict[int, SimulatedPush] = {}
     budget = scene.budget
     simulated: dict[int, tuple[Push, SimulatedPush | None]] = scene.known("simulated", dict)
+    cache = RolloutCache() if scene.cache is None else scene.cache
 
     def simulated_cost(n: int) -> tuple[float, tuple[int, ...]] | None:
         push = graph.pushes[n]
@@ -252,7 +257,12 @@ def _select(
             if budget.is_used_up:
                 if budget.stopped or any(math.isfinite(one.cost) for one in known.values()):
                     return None
+            if budget.seconds < math.inf and not budget.has_room(cache.push_s):
+                return None
+            began = time.perf_counter()
             simulated[id(push)] = push, _first_push(scene, graph.approach, push)
+            took = time.perf_counter() - began
+            cache.push_s = max(took, _FORGETTING * cache.push_s)
         found = simulated[id(push)][1]
         if found is None:
             return math.inf, ()

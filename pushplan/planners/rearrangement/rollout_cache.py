@@ -63,12 +63,14 @@ class RolloutCache:
 
     Attributes:
         searches: how often drives have been searched for the plan in hand.
+        push_s: time that a first push with its approach takes, nearly at most [s].
     """
 
     def __init__(self) -> None:
         self._entries: dict[object, _Entry] = {}
         self._relocations: dict[int, tuple[Asked, list[Primitive]]] = {}
         self.searches = 0
+        self.push_s = 0.0
 
     def relocations(self, target: int, asked: Asked) -> list[Primitive] | None:
         """Drives found for an object, if that was with the same around it.

@@ -17,7 +17,8 @@ struct GoalRegion {
   Vec2 normal{};        // of a line, unit, towards the goal
   double radius = 0.0;  // of a disc [m]
   double heading = std::numeric_limits<double>::quiet_NaN();  // to face in a disc [rad], if any
-  bool turns = false;  // paths turn to it on the spot; else they curve into it
+  bool turns = false;               // paths turn to it on the spot; else they curve into it
+  double heading_tolerance = 0.05;  // to either side [rad]
 
   bool has_heading() const { return !std::isnan(heading); }
 
@@ -26,6 +27,12 @@ struct GoalRegion {
     const double dy = p.y - point.y;
     if (kind == Kind::kDisc) return dx * dx + dy * dy <= radius * radius;
     return dx * normal.x + dy * normal.y >= 0.0;
+  }
+
+  /// True if a robot at a pose is there, and faces the heading if there is one.
+  bool reached_by(const Pose& pose) const {
+    const double error = has_heading() ? wrap_angle(heading - pose.theta) : 0.0;
+    return contains({pose.x, pose.y}) && std::abs(error) <= heading_tolerance;
   }
 
   /// Distance [m] from a point; 0 inside.

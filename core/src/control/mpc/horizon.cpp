@@ -44,6 +44,19 @@ Twist CommandLimits::nearest(const Twist& wanted, const Twist& last, double held
   return command;
 }
 
+Twist CommandLimits::at_end(const ReferencePath& track, double heading, double held) const {
+  if (std::isnan(track.last_heading)) return {0.0, 0.0};
+  const double left = wrap_angle(track.last_heading - heading);
+  const double slowing = max_turn_acceleration * held;
+  double most = std::min(max_turn_rate, std::abs(left) / held);
+  if (std::isfinite(slowing)) {  // so that it falls to 0 within what is left
+    const double half = 0.5 * slowing;
+    const double square = half * half + 2.0 * max_turn_acceleration * std::abs(left);
+    most = std::min(most, std::sqrt(square) - half);
+  }
+  return {0.0, std::copysign(most, left)};
+}
+
 double CommandLimits::turn_from() const {
   const bool on_the_spot = !constant && turning_radius == 0.0;
   return on_the_spot ? kTurnStopped : kTurnDriving;

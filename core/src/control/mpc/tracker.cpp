@@ -184,7 +184,7 @@ Twist Tracker::command_for(const ReferencePath& track, const Pose& pose, double 
   const double error = errors(track, pose_, place).error;
   if (tuning_.stops && place.along >= track.length() - 1e-9) {
     horizon_.known = false;
-    return horizon_.send({0.0, 0.0}, held, true);
+    return horizon_.send(horizon_.limits.at_end(track, pose_.theta, held), held, true);
   }
   if (std::abs(error) > horizon_.limits.turn_from()) {
     // too far from the path's heading for a linear model: turn towards it first

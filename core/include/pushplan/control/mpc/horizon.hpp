@@ -22,6 +22,8 @@ struct CommandLimits {
   /// The nearest command within the limits, held for a time [s] after another one; `ramps`: within
   /// the accelerations too.
   Twist nearest(const Twist& wanted, const Twist& last, double held, bool ramps) const;
+  /// The command at the end of a path: a stop, or a turn on the spot that ends at its last heading.
+  Twist at_end(const ReferencePath& track, double heading, double held) const;
   /// The heading error from which the robot turns towards the path first [rad].
   double turn_from() const;
   /// The speed at which a robot that can stop turns as fast as it can [m/s].

@@ -18,6 +18,8 @@ struct ReferencePath {
   std::span<const Pose> poses;
   std::span<const double> lengths;  // path length from the first pose [m]
   std::span<const double> speeds;   // forward speed from each pose on [m/s]
+  /// Heading to which the robot turns on the spot at the end [rad], if any.
+  double last_heading = std::numeric_limits<double>::quiet_NaN();
 
   double length() const { return lengths.back(); }
 };
