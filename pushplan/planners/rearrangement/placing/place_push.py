@@ -237,11 +237,11 @@ class PlacePushes:
         for contact in scene.contacts[k]:
             start = contact.robot_at(here)
             turning = scene.pushes(contact)
-            failed = self._history.cost(scene, k, contact, True)
+            missed = self._history.cost(scene, k, contact, True)
             for end in scene.ends(k, contact):
                 length = turning.length(start, end)
                 if length < _LONGEST * size:
-                    yield _Option(length + failed, contact, start, end, length, (), failed)
+                    yield _Option(length + missed, contact, start, end, length, (), missed)
             failed = self._history.cost(scene, k, contact, False)
             heading = np.array([math.cos(start[2]), math.sin(start[2])])
             along = float((goal[:2] - here[:2]) @ heading)
@@ -252,7 +252,7 @@ class PlacePushes:
                 target = ahead_of(start, length)
                 there = contact.object_at(target)
                 if self._is_close(k, there):
-                    yield _Option(length + failed, contact, start, target, length, (), failed)
+                    yield _Option(length + missed, contact, start, target, length, (), missed)
                     continue
                 nexts = self._following(k, there)
                 if nexts:

@@ -94,7 +94,9 @@ class Placer:
             self._history.failures.clear()
             self._look_at = world.time + self._wait
             self._wait = min(2.0 * self._wait, _LONGEST_WAIT)
-            self._recover(world)
+            scene = PlacingScene(world, self._grip)
+            if not scene.alone_wide.is_free(world.robot_pose):
+                self._recover(world)
             return self._recovery is not None
         self._wait = _WAIT
         self.order = choice.order
