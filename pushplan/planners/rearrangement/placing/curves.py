@@ -19,7 +19,7 @@ _NEAREST = 12  # of them, to which each is joined
 
 @dataclass(frozen=True)
 class Turning:
-    """How a body turns.
+    """Limits on how a body turns.
 
     Args:
         radius: least turning radius [m].

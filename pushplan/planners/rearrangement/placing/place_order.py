@@ -26,7 +26,7 @@ _LONGEST = 80.0  # way to a push [circumscribed radii]
 
 @dataclass(frozen=True, eq=False)
 class PlaceChoice:
-    """What to do next.
+    """Choice of what to do next.
 
     Args:
         push: the first push.

@@ -117,7 +117,7 @@ class PlacingHistory:
         self.failures[self._key(scene, push.k, push.contact, push.final)] += 1
 
     def cost(self, scene: PlacingScene, k: int, contact: Contact, final: bool) -> float:
-        """What to add to the cost of a push [m]; inf if it has been tried too often."""
+        """Return what to add to the cost of a push [m]; inf if it has been tried too often."""
         count = self.failures[self._key(scene, k, contact, final)]
         if count >= _MOST_FAILURES:
             return math.inf
@@ -193,7 +193,7 @@ class PlacePushes:
         return pushes
 
     def _blocks(self, k: int, pose: FloatArray, pushes: list[PlacePush]) -> int:
-        """How many of the pushes object ``k`` would block at a pose (3,)."""
+        """Count the pushes that object ``k`` would block at a pose (3,)."""
         return sum(not self._is_clear_of(push, k, pose) for push in pushes)
 
     def _is_clear_of(self, push: PlacePush, k: int, pose: FloatArray) -> bool:
@@ -313,7 +313,7 @@ class PlacePushes:
     def _part(
         self, k: int, contact: Contact, poses: FloatArray
     ) -> tuple[bool, tuple[Part, ...]] | None:
-        """Whether no object is in the way of a push, and the push; None if a wall is."""
+        """Return if no object is in the way of a push, and the push; None if a wall is."""
         scene = self._scene
         if not is_clear(self._checker(k, contact, False), poses):
             return None

@@ -80,12 +80,12 @@ class PlacingScene:
 
     @cached_property
     def drives(self) -> Turning:
-        """How the robot turns between pushes, if it is a car."""
+        """Turning of the robot between pushes, if it is a car."""
         radius = _STEERING * self.robot.min_turning_radius
         return Turning(radius, True, _STEP * self.size)
 
     def pushes(self, contact: Contact) -> Turning:
-        """How robot and object turn together."""
+        """Turning of robot and object together."""
         return Turning(contact.radius, False, _STEP * self.size)
 
     def goal_poses(self, k: int) -> list[FloatArray]:
