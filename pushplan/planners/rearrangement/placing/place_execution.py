@@ -7,7 +7,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pushplan.control import LegFollower, Legs, PoseFollower, StallChecker
+from pushplan.control import (
+    LegFollower,
+    Legs,
+    PoseFollower,
+    ProgressChecker,
+    StallChecker,
+    decrease_by,
+)
 from pushplan.control.limits import approach_speed
 from pushplan.planners.pushing import PushingConfig, PushingMpc, PushParameters, PushPath
 from pushplan.planners.rearrangement.placing.contact import ahead_of, compose, inverse
@@ -24,6 +31,8 @@ _PASSED = 0.12  # distance at which a corner of the way counts as reached [circu
 _ROUGHLY = math.radians(12.0)  # error of the heading with which it sets out for one
 _STEP = 0.12  # distance of poses on a straight way [circumscribed radii]
 _BRAKING = 0.5  # time in which a push comes to a stop, so that the object does not run ahead [s]
+_PROGRESS = 0.01  # by which a push gets on [circumscribed radii]
+_PATIENCE = 2.0  # time without getting on after which it is given up [s]
 _BEYOND = 30  # poses by which the path of an object is longer than its way
 _PRESS = 0.02  # by which the robot drives on into contact [circumscribed radii]
 _LOST_GAP = 0.25  # gap between bumper and object at which it is lost [circumscribed radii]
@@ -200,6 +209,9 @@ class PlaceExecution:
         )
         pusher.reset(world)
         stall = StallChecker(self._robot)
+        progress = ProgressChecker(
+            decrease_by(_PROGRESS * self._robot.circumscribed_radius), _PATIENCE
+        )
         braking = min(self._robot.max_acceleration, self._robot.max_speed / _BRAKING)
 
         def command(world: World, held: float) -> Twist | None:
@@ -210,7 +222,7 @@ class PlaceExecution:
                 return None
             twist = pusher.command(world, plan)
             left = length - pusher.along
-            if left < 1e-6:
+            if left < 1e-6 or not progress.update(left, world.time):
                 return None
             slower = min(1.0, approach_speed(left, braking, held) / max(twist.linear, 1e-9))
             twist = Twist(slower * twist.linear, slower * twist.angular)

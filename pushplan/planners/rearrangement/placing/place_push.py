@@ -17,6 +17,7 @@ from pushplan.planners.rearrangement.placing.curves import is_clear, way_around
 from pushplan.planners.rearrangement.placing.placing_scene import PlacingScene
 from pushplan.world.checks import FloatArray
 from pushplan.world.outline import transform
+from pushplan.world.polyline import path_length
 
 # All lengths in circumscribed radii.
 _LENGTHS = (0.85, 1.8, 3.2, 5.0, 7.5)  # of straight pushes
@@ -44,6 +45,7 @@ class Part(NamedTuple):
 
     contact: Contact
     poses: FloatArray  # (N, 3) of the robot
+    runs: FloatArray  # (M, 3) of it before contact and after the push
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,12 +202,11 @@ class PlacePushes:
         """True if a push and the next are clear of object ``k`` at a pose (3,)."""
         scene = self._scene
         there = obstacles(scene.empty, [transform(pose, part) for part in scene.movables.parts(k)])
+        alone = core.CollisionChecker(scene.alone_body, there)
         return all(
             is_clear(core.CollisionChecker(part.contact.wide, there), part.poses)
+            and is_clear(alone, part.runs)
             for part in push.way
-        ) and all(
-            core.CollisionChecker(scene.alone_body, there).is_free(off)
-            for off in (push.start, push.end)
         )
 
     def _of_object(self, k: int) -> list[PlacePush]:
@@ -305,7 +306,8 @@ class PlacePushes:
         self, k: int, way: tuple[Part, ...], length: float, rest: float, penalty: float, free: bool
     ) -> PlacePush:
         scene = self._scene
-        contact, poses = way[0]
+        contact = way[0].contact
+        poses = way[0].poses
         start = scene.backed_off(k, poses[0], contact)
         end = scene.backed_off(k, poses[-1], contact)
         return PlacePush(k, way, length, rest, penalty, free, start, end)
@@ -317,12 +319,12 @@ class PlacePushes:
         scene = self._scene
         if not is_clear(self._checker(k, contact, False), poses):
             return None
-        offs = [scene.backed_off(k, pose, contact) for pose in (poses[0], poses[-1])]
-        if not all(map(scene.at_walls.is_free, offs)):
+        before = scene.runs(k, poses[0], contact)
+        after = scene.runs(k, poses[-1], contact)
+        if before is None or after is None:
             return None
-        free = all(map(scene.alone(k).is_free, offs))
-        free = free and is_clear(self._checker(k, contact, True), poses)
-        return free, (Part(contact, poses),)
+        free = before[0] and after[0] and is_clear(self._checker(k, contact, True), poses)
+        return free, (Part(contact, poses, np.vstack([before[1], after[1]])),)
 
     def _around(self, k: int) -> list[PlacePush]:
         """The push to its place around what is in the way, if one is found."""
@@ -338,18 +340,18 @@ class PlacePushes:
             contact = scene.contacts[k][i]
             start = contact.robot_at(here)
             target = contact.robot_at(scene.goal_poses(k)[j])
-            offs = [scene.backed_off(k, pose, contact) for pose in (start, target)]
+            runs = [scene.runs(k, pose, contact) for pose in (start, target)]
             failed = self._history.cost(scene, k, contact, True)
-            if math.isinf(failed) or not all(map(scene.alone(k).is_free, offs)):
+            if math.isinf(failed) or not all(run is not None and run[0] for run in runs):
                 continue
             tried += 1
             most = min(_LONGEST * scene.size, 3.0 * length + 10.0 * scene.size)
             checker = self._checker(k, contact, True)
             bounds = scene.world.static.bounds
             poses = way_around(scene.pushes(contact), start, target, checker, bounds, most)
-            if poses is not None:
-                long = float(np.hypot(*np.diff(poses[:, :2], axis=0).T).sum())
-                return [self._push(k, (Part(contact, poses),), long, 0.0, failed, True)]
+            found = None if poses is None else self._part(k, contact, poses)
+            if poses is not None and found is not None:
+                return [self._push(k, found[1], path_length(poses[:, :2]), 0.0, failed, found[0])]
             if tried == _AROUND:
                 break
         return []
@@ -406,8 +408,6 @@ class PlacePushes:
         others = [shape for j, shape in enumerate(scene.shapes) if j != k]
         for contact in scene.contacts[k]:
             start = contact.robot_at(scene.poses[k])
-            if not scene.alone(k).is_free(scene.backed_off(k, start, contact)):
-                continue
             for length in _LENGTHS:
                 poses = scene.pushes(contact).poses(start, ahead_of(start, length * size))
                 part = self._part(k, contact, poses)

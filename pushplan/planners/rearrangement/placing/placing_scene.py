@@ -17,7 +17,7 @@ from pushplan.planners.rearrangement.placing.contact import (
     ahead_of,
     contacts_of,
 )
-from pushplan.planners.rearrangement.placing.curves import Turning
+from pushplan.planners.rearrangement.placing.curves import Turning, is_clear
 from pushplan.world import Drive, ObjectGoals, StaticMap, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 from pushplan.world.outline import transform
@@ -26,6 +26,8 @@ _STEP = 0.12  # distance of the poses along a push [circumscribed radii]
 _HEADINGS = 8  # of an object that may have any
 _TURNING_ROOM = 0.09  # between object and a robot that turns in front of it [circumscribed radii]
 _OFF = 0.35  # distance by which a car is off an object before it steers [circumscribed radii]
+_RUN = 1.5  # length of the way on which a car comes to an object or leaves it [radii, the same]
+_RUN_POSES = 8  # that are looked at on it
 _STEERING = 1.1  # turning radius that a car plans with, over its least
 
 
@@ -113,6 +115,31 @@ class PlacingScene:
         front = contact.model.bumper.front
         off = self.size + radius + _TURNING_ROOM * self.size - front - depth
         return ahead_of(pose, -max(off, _OFF * self.size))
+
+    def runs(self, k: int, pose: FloatArray, contact: Contact) -> tuple[bool, FloatArray] | None:
+        """Room behind object ``k`` for a robot at a pose (3,): where it comes from and leaves to.
+
+        Returns:
+            True if no object is there, and (N, 3) poses from where it has backed off; a car needs
+            room to drive on backwards, straight or in a curve. None if something static is there.
+        """
+        off = self.backed_off(k, pose, contact)
+        ways = [off[None]]
+        if self.is_car:
+            curvatures = (0.0, 1.0 / self.drives.radius, -1.0 / self.drives.radius)
+            ways = [self._run(off, curvature) for curvature in curvatures]
+        ways = [way for way in ways if is_clear(self.at_walls, way)]
+        for way in ways:
+            if is_clear(self.alone(k), way):
+                return True, way
+        return (False, ways[0]) if ways else None
+
+    def _run(self, pose: FloatArray, curvature: float) -> FloatArray:
+        """(N, 3) poses of an arc backwards."""
+        poses = np.empty((_RUN_POSES, 3))
+        for i, row in enumerate(poses):
+            core.along_arc(pose, -_RUN * self.size * i / (_RUN_POSES - 1), curvature, row)
+        return poses
 
     def among(self, k: int) -> core.ConvexObstacles:
         """Everything static, and all objects but ``k``; all if it is -1."""
