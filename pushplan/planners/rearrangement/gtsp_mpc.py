@@ -63,6 +63,10 @@ class GtspMpc(RearrangementPolicy):
         costs: terms that are added to the cost by which pushes are chosen.
         overrides: fields of the default config to change, in place of ``config``.
 
+    With a goal of `ObjectGoals` objects are brought to places of their own (docs/gtsp-mpc.md). Of
+    the settings ``grip``, ``mpc``, ``order``, ``response`` and the noise count then, and the
+    attributes below stay empty.
+
     Attributes:
         given_up: why nothing more is tried with an object, by id.
         plan: the pushes planned last, in order.
@@ -91,7 +95,7 @@ class GtspMpc(RearrangementPolicy):
     def _forget(self) -> None:
         super()._forget()
         self._executor: PlanningExecutor = ImmediateExecutor()
-        self._placer = Placer(self.config, self.stop)
+        self._placer = Placer(self.config, self.stop, np.random.default_rng(0))
         self._choosing: PendingChoice | None = None
         self._execution: PushExecution | None = None
         self._shown: Push | None = None
@@ -118,6 +122,7 @@ class GtspMpc(RearrangementPolicy):
         if self._execution is not None:
             self._execution.abandon()
         super().reset(world, rng)
+        self._placer = Placer(self.config, self.stop, rng)
 
     def plan_with(self, executor: PlanningExecutor) -> None:
         """See `pushplan.world.PlansBesideDriving`."""
@@ -126,14 +131,19 @@ class GtspMpc(RearrangementPolicy):
     def expect_noise(self, position: float, heading: float) -> None:
         """See `pushplan.world.ExpectsNoise`."""
         self.config = replace(self.config, position_noise=position, heading_noise=heading)
+        self._placer.config = self.config
 
     def _check(self, world: World) -> None:
         if not isinstance(world.goal, ObjectGoals):
             super()._check(world)
         elif not (world.robot.min_speed < 0.0 and world.robot.drive in _PLACING_DRIVES):
             raise InvalidInputError(
-                "pushing objects to places needs a robot that drives back, with one of the drives "
+                "pushing objects to places needs a robot that can reverse, with one of the drives "
                 + ", ".join(drive.value for drive in _PLACING_DRIVES)
+            )
+        elif self.costs:
+            raise InvalidInputError(
+                "costs are for goals that objects share; with places of their own none counts"
             )
 
     def _act(self, world: World) -> Twist:

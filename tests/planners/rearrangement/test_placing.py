@@ -22,6 +22,7 @@ from pushplan.planners.rearrangement.placing.placing_scene import PlacingScene
 from pushplan.scenarios import generate_rearrangement
 from pushplan.world import (
     Drive,
+    GoalPose,
     InvalidInputError,
     Movables,
     ObjectGoals,
@@ -185,7 +186,7 @@ def test_pushes_that_have_failed_are_left_out() -> None:
     best = min(PlacePushes(scene, history).towards_places(), key=lambda push: push.cost)
     assert best.final
     for _ in range(3):
-        history.count(scene, best)
+        history.count(best)
     left = PlacePushes(scene, history).towards_places()
     assert not any(push.final and push.contact is best.contact for push in left)
 
@@ -214,6 +215,43 @@ def test_a_robot_that_finds_no_push_stands() -> None:
     assert policy.act(replace(world, static=static)) == Twist(0.0, 0.0)
 
 
+def test_the_robot_goes_to_its_own_goal_in_the_end() -> None:
+    world = scene_of([(0.5, 0.0, 0.0)], [(0.5, 0.0, 0.0)])
+    assert isinstance(world.goal, ObjectGoals)
+    goal = replace(world.goal, robot=GoalPose(np.array([0.8, 0.6]), 0.05, 1.0, 0.1))
+    world = replace(world, goal=goal)
+    policy = GtspMpc()
+    policy.reset(world, np.random.default_rng(0))
+    pose = np.array(world.robot_pose)
+    for i in range(400):
+        twist = policy.act(replace(world, robot_pose=pose, time=0.1 * i))
+        out = np.empty(3)
+        length = 0.1 * twist.linear
+        curvature = twist.angular / twist.linear if twist.linear else 0.0
+        core.along_arc(pose, length, curvature, out)
+        pose = out if twist.linear else pose + np.array([0.0, 0.0, 0.1 * twist.angular])
+    assert replace(world, robot_pose=pose).goal_reached
+
+
+def test_an_object_that_vanishes_is_left_alone() -> None:
+    world = scene_of([(0.0, 0.0, 0.0), (0.4, 0.5, 0.0)], [(0.5, 0.0, 0.0), (0.6, 0.9, 0.0)])
+    policy = GtspMpc()
+    policy.reset(world, np.random.default_rng(0))
+    policy.act(world)
+    gone = world.movables.ids[policy._placer._execution.push.k]  # type: ignore[union-attr]
+    there = np.flatnonzero(world.movables.ids != gone)
+    for i in range(1, 300):
+        policy.act(replace(world, movables=world.movables.select(there), time=0.1 * i))
+
+
+def test_noise_is_heeded() -> None:
+    policy = GtspMpc()
+    world = scene_of([(0.0, 0.0, 0.0)], [(0.5, 0.0, 0.0)])
+    policy.reset(world, np.random.default_rng(0))
+    policy.expect_noise(0.01, 0.02)
+    assert policy._placer.config.position_noise == 0.01
+
+
 def test_decisions_may_take_their_time() -> None:
     world = scene_of([(0.0, 0.0, 0.0)], [(0.5, 0.0, 0.0)])
     policy = GtspMpc()
@@ -231,7 +269,7 @@ def test_robots_that_cannot_drive_back_are_refused(robot: Any) -> None:
     world = scene_of([(0.0, 0.0, 0.0)], [(0.5, 0.0, 0.0)], robot=robot)
     policy = GtspMpc()
     policy.reset(world, np.random.default_rng(0))
-    with pytest.raises(InvalidInputError, match="drives back"):
+    with pytest.raises(InvalidInputError, match="can reverse"):
         policy.act(world)
 
 

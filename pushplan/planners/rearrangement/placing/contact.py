@@ -21,7 +21,7 @@ from pushplan.world.outline import convex_outline, flatten, transform
 _FRACTION = 0.7  # of the stable curvature that is used
 _LEAST_FACE = 0.2  # shortest face that is pushed [half widths of the bumper]
 MARGIN = 0.07  # that robot and object keep from other objects [circumscribed radii]
-_STRAIGHT = 1e-3  # least curvature that is taken to be one [1/circumscribed radii]
+_STRAIGHT = 1e-3  # curvature below which a face does not hold [1/circumscribed radii]
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +82,9 @@ def _contacts(
         if face.high - face.low < _LEAST_FACE * half:
             continue
         model = PushModel(robot, outline, PushParameters(friction), face, radius or None)
-        curvature = max(_FRACTION * model.stable_curvature(), _STRAIGHT / size)
+        curvature = _FRACTION * model.stable_curvature()
+        if curvature < _STRAIGHT / size:
+            continue
         pose = np.array([model.reach, -0.5 * (face.low + face.high), -face.normal])
         parts = [*robot.wall_parts, transform(pose, outline)]
         turning = max(1.0 / curvature, robot.min_turning_radius)

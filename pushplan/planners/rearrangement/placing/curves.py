@@ -149,7 +149,9 @@ class _Roadmap:
             blocked = [edge for edge in edges if not self._is_clear(edge)]
             if not blocked:
                 parts = [self._known[edge] for edge in edges]
-                return np.vstack([parts[0], *(part[1:] for part in parts[1:])])
+                path = np.vstack([parts[0], *(part[1:] for part in parts[1:])])
+                path[:, 2] = np.unwrap(path[:, 2])
+                return path
             for edge in blocked:
                 self._lengths[edge] = math.inf
 

@@ -27,6 +27,7 @@ from pushplan.world.polyline import path_length
 
 _ALIGNED = math.radians(0.4)  # error of a heading that is left where a push begins
 _PLACED = 0.004  # error of the place that is left there [circumscribed radii]
+_ARRIVED = 0.3  # distance from the end of its way at which the robot is there [the same]
 _PASSED = 0.12  # distance at which a corner of the way counts as reached [circumscribed radii]
 _ROUGHLY = math.radians(12.0)  # error of the heading with which it sets out for one
 _STEP = 0.12  # distance of poses on a straight way [circumscribed radii]
@@ -37,7 +38,7 @@ _BEYOND = 30  # poses by which the path of an object is longer than its way
 _PRESS = 0.02  # by which the robot drives on into contact [circumscribed radii]
 _LOST_GAP = 0.25  # gap between bumper and object at which it is lost [circumscribed radii]
 _LOST_ASIDE = 1.2  # offset at which it is [half widths of the bumper]
-_LONGER = 1.3  # a curve from where contact was made is good that is longer by less
+_LONGER = 1.15  # a curve from where contact was made is good that is longer by less
 
 Follower = Callable[[World, float], Twist | None]
 """From the scene and for how long a command is held [s] to the velocity; None at the end."""
@@ -48,24 +49,23 @@ class PlaceExecution:
 
     Args:
         choice: the push and the way to it.
-        world: as it begins.
+        robot: its limits.
         config: settings; ``mpc`` says by which controller the object is pushed.
         grip: friction that is counted on.
 
     Attributes:
-        pushing: the push itself has begun.
         stuck: the robot did not get to its start.
         slip: how far the object has slid to the left on the bumper during the push [m].
     """
 
     def __init__(
-        self, choice: PlaceChoice, world: World, config: RearrangementConfig, grip: float
+        self, choice: PlaceChoice, robot: RobotModel, config: RearrangementConfig, grip: float
     ) -> None:
         self.push = choice.push
-        self.label = int(world.movables.ids[choice.push.k])
+        self.label = choice.push.label
         self._config = config
         self._grip = grip
-        self._robot = world.robot
+        self._robot = robot
         self._goal = choice.push.object_pose
         self._stages: list[Callable[[World], Follower]] = [
             lambda now: self._on_the_way(choice.way),
@@ -74,7 +74,6 @@ class PlaceExecution:
             self._back,
         ]
         self._follower: Follower | None = None
-        self.pushing = False
         self.stuck = False
         self.slip = 0.0
         self._aside = 0.0
@@ -89,7 +88,6 @@ class PlaceExecution:
         while self._follower is not None or self._stages:
             if self._follower is None:
                 self._follower = self._stages.pop(0)(world)
-                self.pushing = len(self._stages) == 1
             twist = self._follower(world, held)
             if twist is not None:
                 return twist
@@ -102,44 +100,14 @@ class PlaceExecution:
         return world.movables.poses[found[0]] if len(found) else None
 
     def _on_the_way(self, way: Legs | FloatArray) -> Follower:
-        if not isinstance(way, Legs):
-            return self._through(way)
-        config = self._config
-        size = self._robot.circumscribed_radius
-        last = Legs.ahead(way.points[-1:], way.heading)
-        drivers = [
-            LegFollower(
-                self._robot,
-                last,
-                near=_PLACED * size + config.position_noise,
-                aligned=_ALIGNED + config.heading_noise,
-                response=config.response,
-            )
-        ]
-        if len(way.points) > 1:
-            around = Legs.ahead(way.points[:-1])
-            drivers.insert(
-                0,
-                LegFollower(
-                    self._robot,
-                    around,
-                    near=_PASSED * size,
-                    aligned=_ROUGHLY,
-                    response=config.response,
-                ),
-            )
+        follower = WayFollower(self._robot, way, self._config)
 
         def command(world: World, held: float) -> Twist | None:
-            while drivers:
-                twist = drivers[0].command(world.robot_pose, world.time, held)
-                if twist is not None:
-                    return twist
-                if not drivers[0].arrived:
-                    self.stuck = True
-                    self._stages.clear()
-                    return None
-                drivers.pop(0)
-            return None
+            twist = follower.command(world, held)
+            if twist is None and not follower.arrived:
+                self.stuck = True
+                self._stages.clear()
+            return twist
 
         return command
 
@@ -160,6 +128,8 @@ class PlaceExecution:
             return lambda world, held: None
         self._aside = self._offset(world, there)
         poses = self._from_here(world.robot_pose, there)
+        if len(poses) < 2:  # it is there already
+            return lambda world, held: None
         if self._config.mpc:
             return self._by_prediction(world, poses, there)
         follow = self._through(poses)
@@ -182,14 +152,16 @@ class PlaceExecution:
         end = compose(self._goal, inverse(seen))
         if not push.final:
             end = ahead_of(here, push.length)
-        most = _LONGER * push.length + 2.0 * step
-        if turning.length(here, end) <= most:
-            return turning.poses(here, end)
+        shortest = turning.length(push.poses[0], push.poses[-1])
+        if push.length - shortest < 2.0 * step:  # else it leads around something
+            if turning.length(here, end) <= _LONGER * push.length + 2.0 * step:
+                return turning.poses(here, end)
         return np.vstack([here, push.poses[1:]])
 
     def _by_prediction(self, world: World, poses: FloatArray, there: FloatArray) -> Follower:
         """Push by `PushingMpc` along the poses that the object has on the way."""
         config = self._config
+        poses[:, 2] = np.unwrap(poses[:, 2])
         seen = compose(inverse(poses[0]), there)
         step = compose(inverse(poses[-2]), poses[-1])
         beyond = [poses[-1]]  # else the controller would turn too little at the end
@@ -236,7 +208,7 @@ class PlaceExecution:
         model = self.push.contact.model
         x, y, _ = compose(inverse(world.robot_pose), there).tolist()
         gap = x - model.reach
-        wide = abs(y) > _LOST_ASIDE * model.bumper.half
+        wide = abs(y - self.push.contact.object_pose[1]) > _LOST_ASIDE * model.bumper.half
         return wide or bool(gap > _LOST_GAP * self._robot.circumscribed_radius)
 
     def _offset(self, world: World, there: FloatArray) -> float:
@@ -253,8 +225,59 @@ class PlaceExecution:
         return self._through(straight_poses(self._robot, here, ahead_of(here, -off)))
 
     def _through(self, poses: FloatArray) -> Follower:
+        poses[:, 2] = np.unwrap(poses[:, 2])
         follower = PoseFollower(self._robot, poses, self._config.response)
         return lambda world, held: follower.command(world.robot_pose, world.time, held)
+
+
+class WayFollower:
+    """Drives a way of `way_to`.
+
+    Args:
+        robot: its limits.
+        way: `Legs`, of which only the last ends precisely, or (N, 3) poses.
+        config: settings.
+
+    Attributes:
+        arrived: the robot is at its end.
+    """
+
+    def __init__(
+        self, robot: RobotModel, way: Legs | FloatArray, config: RearrangementConfig
+    ) -> None:
+        size = robot.circumscribed_radius
+        response = config.response
+        self.arrived = False
+        self._end: FloatArray
+        self._near = _ARRIVED * size
+        self._drivers: list[LegFollower | PoseFollower]
+        if not isinstance(way, Legs):
+            self._end = way[-1, :2]
+            self._drivers = [PoseFollower(robot, way, response)]
+            return
+        self._end = way.points[-1]
+        near = _PLACED * size + config.position_noise
+        aligned = _ALIGNED + config.heading_noise
+        last = Legs.ahead(way.points[-1:], way.heading)
+        self._drivers = [LegFollower(robot, last, near=near, aligned=aligned, response=response)]
+        if len(way.points) > 1:
+            corners = Legs.ahead(way.points[:-1])
+            near = max(_PASSED * size, near)
+            driver = LegFollower(robot, corners, near=near, aligned=_ROUGHLY, response=response)
+            self._drivers.insert(0, driver)
+
+    def command(self, world: World, held: float) -> Twist | None:
+        """The velocity to drive now; None when it is there, or does not get there."""
+        while self._drivers:
+            driver = self._drivers[0]
+            twist = driver.command(world.robot_pose, world.time, held)
+            if twist is not None:
+                return twist
+            if isinstance(driver, LegFollower) and not driver.arrived:
+                return None
+            self._drivers.pop(0)
+        self.arrived = math.dist(world.robot_pose[:2], self._end) < self._near
+        return None
 
 
 def poses_of(poses: FloatArray, seen: FloatArray) -> FloatArray:

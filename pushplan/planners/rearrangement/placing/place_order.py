@@ -15,7 +15,6 @@ from pushplan.planners.rearrangement.placing.placing_scene import PlacingScene
 from pushplan.world import MaxIterations
 from pushplan.world.checks import FloatArray
 
-ORDERS = ("gtsp", "nearest", "random")
 _DETOUR = 1.2  # of a way between pushes, over the straight one
 _TURN = 0.15  # cost of a turn on the spot [circumscribed radii/rad]
 _LATER = 1e3  # cost of beginning with a push that is not free [m]
@@ -61,7 +60,7 @@ def first_push(
         first = pushes[tour[0]]
         if not free[tour[0]]:
             return None
-        way = way_to(scene, first)
+        way = way_to(scene, first.start)
         if way is not None:
             return PlaceChoice(first, way, tuple(pushes[n] for n in tour))
         free[tour[0]] = False
@@ -110,10 +109,9 @@ def _costs(scene: PlacingScene, pushes: list[PlacePush]) -> FloatArray:
     return np.asarray(ways + own)
 
 
-def way_to(scene: PlacingScene, push: PlacePush) -> Legs | FloatArray | None:
-    """The way around all objects to the start of a push; None if there is none."""
+def way_to(scene: PlacingScene, target: FloatArray) -> Legs | FloatArray | None:
+    """The way around all objects to a pose (3,); None if there is none."""
     here = scene.world.robot_pose
-    target = push.start
     if scene.is_car:
         bounds = scene.world.static.bounds
         most = _LONGEST * scene.size

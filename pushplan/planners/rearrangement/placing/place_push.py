@@ -54,18 +54,20 @@ class PlacePush:
 
     Args:
         k: index of the object.
+        label: its id.
         way: the push, and the one after it where that does not end at the object's place.
         length: of the push [m].
         rest: cost of bringing the object to its place from there [m]; 0 where the push does.
         penalty: further cost [m].
         early: cost of beginning with it, because the object's place is in the way of others [m].
         free: nothing is in the way.
-        favours: index of the object for which it makes room; -1 if none.
+        favours: id of the object for which it makes room; None if it does not.
         start: (3,) the robot before contact.
         end: (3,) the robot once it has backed off.
     """
 
     k: int
+    label: int
     way: tuple[Part, ...]
     length: float
     rest: float
@@ -74,7 +76,7 @@ class PlacePush:
     start: FloatArray
     end: FloatArray
     early: float = 0.0
-    favours: int = -1
+    favours: int | None = None
 
     @property
     def contact(self) -> Contact:
@@ -114,13 +116,13 @@ class PlacingHistory:
     failures: Counter[tuple[int, float, bool]] = field(default_factory=Counter)
     waits: dict[int, int] = field(default_factory=dict)
 
-    def count(self, scene: PlacingScene, push: PlacePush) -> None:
+    def count(self, push: PlacePush) -> None:
         """A push has failed, or was not the last one of its object."""
-        self.failures[self._key(scene, push.k, push.contact, push.final)] += 1
+        self.failures[_key(push.label, push.contact, push.final)] += 1
 
     def cost(self, scene: PlacingScene, k: int, contact: Contact, final: bool) -> float:
         """Return what to add to the cost of a push [m]; inf if it has been tried too often."""
-        count = self.failures[self._key(scene, k, contact, final)]
+        count = self.failures[_key(int(scene.movables.ids[k]), contact, final)]
         if count >= _MOST_FAILURES:
             return math.inf
         return _FAILED * scene.size * count
@@ -130,9 +132,10 @@ class PlacingHistory:
         other = self.waits.get(int(scene.movables.ids[k]))
         return other in scene.movables.ids[scene.left].tolist()
 
-    @staticmethod
-    def _key(scene: PlacingScene, k: int, contact: Contact, final: bool) -> tuple[int, float, bool]:
-        return int(scene.movables.ids[k]), round(contact.model.face.normal, 3), final
+
+def _key(label: int, contact: Contact, final: bool) -> tuple[int, float, bool]:
+    """Key by which pushes count as the same."""
+    return label, round(contact.model.face.normal, 3), final
 
 
 class _Curve(NamedTuple):
@@ -310,7 +313,8 @@ class PlacePushes:
         poses = way[0].poses
         start = scene.backed_off(k, poses[0], contact)
         end = scene.backed_off(k, poses[-1], contact)
-        return PlacePush(k, way, length, rest, penalty, free, start, end)
+        label = int(scene.movables.ids[k])
+        return PlacePush(k, label, way, length, rest, penalty, free, start, end)
 
     def _part(
         self, k: int, contact: Contact, poses: FloatArray
@@ -346,7 +350,7 @@ class PlacePushes:
                 continue
             tried += 1
             most = min(_LONGEST * scene.size, 3.0 * length + 10.0 * scene.size)
-            checker = self._checker(k, contact, True)
+            checker = core.CollisionChecker(contact.body, scene.among(k))
             bounds = scene.world.static.bounds
             poses = way_around(scene.pushes(contact), start, target, checker, bounds, most)
             found = None if poses is None else self._part(k, contact, poses)
@@ -357,11 +361,11 @@ class PlacePushes:
         return []
 
     def _checker(self, k: int, contact: Contact, others: bool) -> core.CollisionChecker:
-        """Checks robot and object together, among what is static or all but the object."""
+        """Checks robot and object together, among what is static or all other objects."""
         key = k, id(contact), others
         if key not in self._checkers:
             body = contact.wide if others else contact.body
-            among = self._scene.among(k) if others else self._scene.walls
+            among = self._scene.objects_but(k) if others else self._scene.walls
             self._checkers[key] = core.CollisionChecker(body, among)
         return self._checkers[key]
 
@@ -383,7 +387,7 @@ class PlacePushes:
             for k in range(len(self._scene.movables)):
                 if k != push.k and not self._is_clear_of(push, k, self._scene.poses[k]):
                     found += [
-                        replace(move, favours=push.k)
+                        replace(move, favours=push.label)
                         for move in self._moves(k)
                         if self._is_clear_of(push, k, move.object_pose)
                     ]
@@ -397,7 +401,9 @@ class PlacePushes:
             away = np.hypot(*(scene.poses[scene.left] - scene.poses[k])[:, :2].T)
             near = int(np.argmin(away))
             if away[near] < _NEIGHBOURS * scene.size:
-                favours = -1 if k in scene.left else scene.left[near]
+                favours = None
+                if k not in scene.left:
+                    favours = int(scene.movables.ids[scene.left[near]])
                 found += [replace(push, favours=favours) for push in self._moves(k, shoves=True)]
         return found
 

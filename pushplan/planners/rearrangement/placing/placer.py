@@ -6,26 +6,25 @@ import math
 
 import numpy as np
 
-from pushplan.control import ImmediateExecutor, Recovery
-from pushplan.planners.rearrangement.placing.place_execution import PlaceExecution
-from pushplan.planners.rearrangement.placing.place_order import PlaceChoice, first_push
+from pushplan.control import ImmediateExecutor, Legs, Recovery
+from pushplan.planners.rearrangement.placing.place_execution import PlaceExecution, WayFollower
+from pushplan.planners.rearrangement.placing.place_order import PlaceChoice, first_push, way_to
 from pushplan.planners.rearrangement.placing.place_push import (
-    PlacePush,
     PlacePushes,
     PlacingHistory,
 )
 from pushplan.planners.rearrangement.placing.placing_scene import PlacingScene
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.world import PendingResult, PlanningExecutor, Stop, Twist, World
+from pushplan.world.checks import FloatArray
 
 _MOST_ENDS = 3  # pushes and recoveries that may end in one step until the robot waits
 _RETREAT = 0.3  # distance that the robot backs off where it is stuck [circumscribed radii]
 _SLIPPED = 0.1  # way of an object on the bumper that shows too little grip [circumscribed radii]
 _LESS_GRIP = 0.75  # part of the grip that is counted on from then on
 _LEAST_GRIP = 0.25  # least part of that of the settings
-_WAIT = 1.0
-_LONGEST_WAIT = 60.0
-"""Times after which it looks again where there is no push: at first, and in the end [s]."""
+_WAIT = 1.0  # time after which it looks again where there is no push [s]; then twice as long,
+_LONGEST_WAIT = 60.0  # and at most so long [s]
 
 
 class Placer:
@@ -34,23 +33,26 @@ class Placer:
     Args:
         config: settings.
         stop: stop rule of each decision.
+        rng: of a random order.
     """
 
-    def __init__(self, config: RearrangementConfig, stop: Stop | None) -> None:
-        self._config = config
+    def __init__(
+        self, config: RearrangementConfig, stop: Stop | None, rng: np.random.Generator
+    ) -> None:
+        self.config = config
         self._stop = stop
         self.executor: PlanningExecutor = ImmediateExecutor()
-        self._call: PendingResult[PlaceChoice | None] | None = None
+        self._call: PendingResult[PlaceChoice | Legs | FloatArray | None] | None = None
         self._execution: PlaceExecution | None = None
+        self._to_goal: WayFollower | None = None
         self._history = PlacingHistory()
-        self._rng = np.random.default_rng(0)
+        self._rng = rng
+        self._was_done = False
         self._look_at = -math.inf
         self._wait = _WAIT
-        self.order: tuple[PlacePush, ...] = ()
         self._grip = config.grip
         self._recovery: Recovery | None = None
         self._retreats = 0
-        self.pushes = 0
 
     def command(self, world: World, held: float) -> Twist:
         """The velocity to drive now.
@@ -70,7 +72,16 @@ class Placer:
                 if twist is not None:
                     return twist
                 self._close(world, self._execution)
-            if world.completed.all() or world.time < self._look_at or not self._choose(world):
+                continue
+            if self._to_goal is not None:
+                twist = self._to_goal.command(world, held)
+                if twist is not None:
+                    return twist
+                if not self._to_goal.arrived:
+                    self._recover(world)
+                self._to_goal = None
+                continue
+            if world.goal_reached or world.time < self._look_at or not self._choose(world):
                 break
         return Twist(0.0, 0.0)
 
@@ -91,26 +102,35 @@ class Placer:
         choice = self._call.result()
         self._call = None
         if choice is None:
-            self._history.failures.clear()
-            self._look_at = world.time + self._wait
-            self._wait = min(2.0 * self._wait, _LONGEST_WAIT)
-            scene = PlacingScene(world, self._grip)
-            if not scene.alone_wide.is_free(world.robot_pose):
-                self._recover(world)
+            self._give_up(world)
             return self._recovery is not None
         self._wait = _WAIT
-        self.order = choice.order
-        ids = world.movables.ids
-        if choice.push.favours >= 0:
-            self._history.waits[int(ids[choice.push.k])] = int(ids[choice.push.favours])
-        self.pushes += 1
-        self._execution = PlaceExecution(choice, world, self._config, self._grip)
+        if not isinstance(choice, PlaceChoice):
+            self._to_goal = WayFollower(world.robot, choice, self.config)
+            return True
+        push = choice.push
+        if push.label in world.movables.ids:
+            if push.favours is not None:
+                self._history.waits[push.label] = push.favours
+            self._execution = PlaceExecution(choice, world.robot, self.config, self._grip)
+            self._was_done = bool(world.completed[world.movables.ids == push.label][0])
         return True
 
-    def _best(self, scene: PlacingScene) -> PlaceChoice | None:
+    def _give_up(self, world: World) -> None:
+        """Wait, and get off what the robot touches."""
+        self._history.failures.clear()
+        self._look_at = world.time + self._wait
+        self._wait = min(2.0 * self._wait, _LONGEST_WAIT)
+        if not PlacingScene(world, self._grip).alone_wide.is_free(world.robot_pose):
+            self._recover(world)
+
+    def _best(self, scene: PlacingScene) -> PlaceChoice | Legs | FloatArray | None:
+        """The next push, or the way to the robot's own goal."""
+        if not scene.left:
+            return way_to(scene, scene.robot_goal)
         pushes = PlacePushes(scene, self._history)
         for options in (pushes.towards_places, pushes.making_room, pushes.shoves):
-            choice = first_push(scene, options(), self._config.order, self._rng)
+            choice = first_push(scene, options(), self.config.order, self._rng)
             if choice is not None:
                 return choice
         return None
@@ -118,15 +138,15 @@ class Placer:
     def _close(self, world: World, execution: PlaceExecution) -> None:
         """Note whether the push has brought its object home."""
         self._execution = None
-        scene = PlacingScene(world, self._grip)
         push = execution.push
-        if abs(execution.slip) > _SLIPPED * scene.size:
-            self._grip = max(_LESS_GRIP * self._grip, _LEAST_GRIP * self._config.grip)
-        if scene.done[push.k]:
+        if abs(execution.slip) > _SLIPPED * world.robot.circumscribed_radius:
+            self._grip = max(_LESS_GRIP * self._grip, _LEAST_GRIP * self.config.grip)
+        done = world.completed[world.movables.ids == push.label]
+        if done.all() and not self._was_done:
             self._history.failures.clear()
             self._retreats = 0
         else:
-            self._history.count(scene, push)
+            self._history.count(push)
         if execution.stuck:
             self._recover(world)
 

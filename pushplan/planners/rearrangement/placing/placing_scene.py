@@ -18,12 +18,12 @@ from pushplan.planners.rearrangement.placing.contact import (
     contacts_of,
 )
 from pushplan.planners.rearrangement.placing.curves import Turning, is_clear
-from pushplan.world import Drive, ObjectGoals, StaticMap, World
+from pushplan.world import Drive, GoalPose, ObjectGoals, StaticMap, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 from pushplan.world.outline import transform
 
 _STEP = 0.12  # distance of the poses along a push [circumscribed radii]
-_HEADINGS = 8  # of an object that may have any
+_HEADINGS = 8  # at the place of an object that are looked at
 _TURNING_ROOM = 0.09  # between object and a robot that turns in front of it [circumscribed radii]
 _OFF = 0.35  # distance by which a car is off an object before it steers [circumscribed radii]
 _RUN = 1.5  # length of the way on which a car comes to an object or leaves it [radii, the same]
@@ -50,6 +50,7 @@ class PlacingScene:
         self.friction = friction
         self.poses: FloatArray = world.movables.poses
         self.walls = obstacles(world.static)
+        self._graphs: dict[float, VisibilityGraph] = {}
         self._ends: dict[tuple[int, int], list[FloatArray]] = {}
         self._bodies: dict[int, tuple[core.ConvexObstacles, core.CollisionChecker]] = {}
 
@@ -97,7 +98,20 @@ class PlacingScene:
         count = int(self.goal.symmetries[place])
         if self.goal.heading_tolerances[place] >= math.pi:
             count = max(count, _HEADINGS)
-        return [pose + np.array([0.0, 0.0, math.tau * i / count]) for i in range(count)]
+        here = float(self.poses[k, 2])
+        found = [pose + np.array([0.0, 0.0, math.tau * i / count]) for i in range(count)]
+        found.sort(key=lambda end: abs(math.remainder(float(end[2]) - here, math.tau)))
+        return found[:_HEADINGS]
+
+    @property
+    def robot_goal(self) -> FloatArray:
+        """(3,) pose at which the robot is where it has to be in the end."""
+        goal = self.goal.robot
+        assert goal is not None
+        if isinstance(goal, GoalPose):
+            return goal.pose
+        dx, dy = (goal.center - self.world.robot_pose[:2]).tolist()
+        return np.append(goal.center, math.atan2(dy, dx))
 
     def ends(self, k: int, contact: Contact) -> list[FloatArray]:
         """Poses (3,) of the robot that has object ``k`` at its place on the bumper."""
@@ -144,6 +158,12 @@ class PlacingScene:
     def among(self, k: int) -> core.ConvexObstacles:
         """Everything static, and all objects but ``k``; all if it is -1."""
         return self._others(k)[0]
+
+    def objects_but(self, k: int) -> core.ConvexObstacles:
+        """All objects but ``k``."""
+        others = range(len(self.movables))
+        parts = [part for j in others if j != k for part in self.movables.parts_world(j)]
+        return obstacles(self.empty, parts)
 
     def alone(self, k: int) -> core.CollisionChecker:
         """Checks the robot alone, in `among`."""
@@ -198,6 +218,11 @@ class PlacingScene:
 
     def graph(self, clearance: float) -> VisibilityGraph:
         """Ways of a disc around everything, static or not."""
+        if clearance not in self._graphs:
+            self._graphs[clearance] = self._graph(clearance)
+        return self._graphs[clearance]
+
+    def _graph(self, clearance: float) -> VisibilityGraph:
         static = self.world.static
         parts = [p for j in range(len(self.movables)) for p in self.movables.parts_world(j)]
         solid = StaticMap((*static.polygons, *parts), static.segments, static.radii, static.bounds)
