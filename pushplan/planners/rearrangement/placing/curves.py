@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from dataclasses import dataclass
@@ -12,9 +13,10 @@ from pushplan.core import motion as core
 from pushplan.world.checks import FloatArray
 
 _ARCS = 5  # pieces of a curve at most
-_VIAS = 60  # random poses that a way around may lead through
+_VIAS = 150  # random poses that a way around may lead through
+_NEAREST = 12  # of them, by length of the curve, to which each leads on
+_JOINED = 30  # nearest nodes with which those near start and end are joined
 _ANGLES = (0.35, 0.8, 1.4)  # of arcs from the ends that it may lead along [rad]
-_NEAREST = 12  # of them, to which each is joined
 
 
 @dataclass(frozen=True)
@@ -87,12 +89,19 @@ def way_around(
         return direct
     if not (checker.is_free(start) and checker.is_free(end)):
         return None
-    drawn = np.random.default_rng(0).uniform(
-        (bounds[0], bounds[1], -math.pi), (bounds[2], bounds[3], math.pi), (_VIAS, 3)
-    )
-    drawn = np.vstack([drawn, *_beside(turning, start, 1.0), *_beside(turning, end, -1.0)])
-    nodes = [start, end, *(pose for pose in drawn if checker.is_free(pose))]
-    return _Roadmap(turning, checker, nodes).path(most)
+    return _Roadmap(turning, checker, start, end, bounds).path(most)
+
+
+@functools.lru_cache(maxsize=16)
+def _drawn(turning: Turning, bounds: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
+    """(N, 3) poses in a workspace, and (N, N) lengths of the shortest curves from each [m]."""
+    x0, y0, x1, y1 = bounds
+    poses = np.random.default_rng(0).uniform((x0, y0, -math.pi), (x1, y1, math.pi), (_VIAS, 3))
+    lengths = np.array([[turning.length(a, b) for b in poses] for a in poses])
+    np.fill_diagonal(lengths, math.inf)
+    for row in lengths:
+        row[np.argsort(row, kind="stable")[_NEAREST:]] = math.inf
+    return poses, lengths
 
 
 def _beside(turning: Turning, pose: FloatArray, ahead: float) -> list[FloatArray]:
@@ -111,25 +120,37 @@ class _Roadmap:
     """Poses joined by curves; the first is the start, the second the end."""
 
     def __init__(
-        self, turning: Turning, checker: core.CollisionChecker, nodes: list[FloatArray]
+        self,
+        turning: Turning,
+        checker: core.CollisionChecker,
+        start: FloatArray,
+        end: FloatArray,
+        bounds: FloatArray,
     ) -> None:
         self._turning = turning
         self._checker = checker
-        self._nodes = nodes
-        count = len(nodes)
+        drawn, lengths = _drawn(turning, tuple(bounds.tolist()))
+        free = [i for i, pose in enumerate(drawn) if checker.is_free(pose)]
+        beside = [*_beside(turning, start, 1.0), *_beside(turning, end, -1.0)]
+        near = [start, end, *(pose for pose in beside if checker.is_free(pose))]
+        self._nodes = [*near, *drawn[free]]
+        count = len(self._nodes)
+        first = len(near)
         self._lengths = np.full((count, count), math.inf)
-        places = np.array(nodes)[:, :2]
-        for i in range(count):
-            if i == 1:
-                continue
+        self._lengths[first:, first:] = lengths[np.ix_(free, free)]
+        places = np.array(self._nodes)[:, :2]
+        for i in range(first):
             away = np.hypot(*(places - places[i]).T)
-            near = set(np.argsort(away, kind="stable")[: _NEAREST + 1].tolist()) - {0, i} | {1}
-            if i == 0:
-                near = set(range(1, count))
-            for j in near:
-                self._lengths[i, j] = turning.length(nodes[i], nodes[j])
+            for j in np.argsort(away, kind="stable")[:_JOINED].tolist():
+                self._join(i, j)
+                self._join(j, i)
         self._lengths[0, 1] = math.inf  # the direct curve is blocked
         self._known: dict[tuple[int, int], FloatArray] = {}
+
+    def _join(self, i: int, j: int) -> None:
+        """Take up the curve from one node to another."""
+        if i not in (1, j) and j != 0:
+            self._lengths[i, j] = self._turning.length(self._nodes[i], self._nodes[j])
 
     def path(self, most: float) -> FloatArray | None:
         """The shortest clear path, looked for until the shortest is clear or too long."""
