@@ -154,12 +154,17 @@ class _Roadmap:
 
     def path(self, most: float) -> FloatArray | None:
         """The shortest clear path, looked for until the shortest is clear or too long."""
+        from scipy.sparse import csr_array  # takes longer than the rest of this room
         from scipy.sparse.csgraph import dijkstra
 
+        rows, columns = np.nonzero(np.isfinite(self._lengths))
+        count = len(self._nodes)
+        graph = csr_array((self._lengths[rows, columns], (rows, columns)), shape=(count, count))
+        numbers = {
+            edge: n for n, edge in enumerate(zip(rows.tolist(), columns.tolist(), strict=True))
+        }
         while True:
-            costs, before = dijkstra(
-                self._lengths, directed=True, indices=[0], return_predecessors=True
-            )
+            costs, before = dijkstra(graph, directed=True, indices=[0], return_predecessors=True)
             if not costs[0, 1] <= most or math.isinf(costs[0, 1]):
                 return None
             chain = [1]
@@ -174,7 +179,7 @@ class _Roadmap:
                 path[:, 2] = np.unwrap(path[:, 2])
                 return path
             for edge in blocked:
-                self._lengths[edge] = math.inf
+                graph.data[numbers[edge]] = math.inf
 
     def _is_clear(self, edge: tuple[int, int]) -> bool:
         if edge not in self._known:
