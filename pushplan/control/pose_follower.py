@@ -16,7 +16,7 @@ _REACHED = 0.3  # of a step may be left when the next one begins, so that it doe
 
 
 class PoseFollower:
-    """Drives a differential drive along poses that are a step of it apart, ahead or back.
+    """Drives along poses that are a step of the path apart, ahead or back.
 
     Args:
         robot: its limits.
