@@ -100,7 +100,7 @@ class PlaceExecution:
         return world.movables.poses[found[0]] if len(found) else None
 
     def _on_the_way(self, way: Legs | FloatArray) -> Follower:
-        follower = WayFollower(self._robot, way, self._config)
+        follower = Transit(self._robot, way, self._config)
 
         def command(world: World, held: float) -> Twist | None:
             twist = follower.command(world, held)
@@ -230,8 +230,8 @@ class PlaceExecution:
         return lambda world, held: follower.command(world.robot_pose, world.time, held)
 
 
-class WayFollower:
-    """Drives a way of `way_to`.
+class Transit:
+    """The drive along a way of `way_to`, without an object.
 
     Args:
         robot: its limits.

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from pushplan.control import ImmediateExecutor, Legs, Recovery
-from pushplan.planners.rearrangement.placing.place_execution import PlaceExecution, WayFollower
+from pushplan.planners.rearrangement.placing.place_execution import PlaceExecution, Transit
 from pushplan.planners.rearrangement.placing.place_order import PlaceChoice, first_push, way_to
 from pushplan.planners.rearrangement.placing.place_push import (
     PlacePushes,
@@ -44,7 +44,7 @@ class Placer:
         self.executor: PlanningExecutor = ImmediateExecutor()
         self._call: PendingResult[PlaceChoice | Legs | FloatArray | None] | None = None
         self._execution: PlaceExecution | None = None
-        self._to_goal: WayFollower | None = None
+        self._to_goal: Transit | None = None
         self._history = PlacingHistory()
         self._rng = rng
         self._was_done = False
@@ -106,7 +106,7 @@ class Placer:
             return self._recovery is not None
         self._wait = _WAIT
         if not isinstance(choice, PlaceChoice):
-            self._to_goal = WayFollower(world.robot, choice, self.config)
+            self._to_goal = Transit(world.robot, choice, self.config)
             return True
         push = choice.push
         if push.label in world.movables.ids:
