@@ -62,7 +62,6 @@ class PlaceExecution:
         self, choice: PlaceChoice, robot: RobotModel, config: RearrangementConfig, grip: float
     ) -> None:
         self.push = choice.push
-        self.label = choice.push.label
         self._config = config
         self._grip = grip
         self._robot = robot
@@ -96,7 +95,7 @@ class PlaceExecution:
 
     def _object(self, world: World) -> FloatArray | None:
         """(3,) pose of the object; None if it has gone."""
-        found = np.flatnonzero(world.movables.ids == self.label)
+        found = np.flatnonzero(world.movables.ids == self.push.label)
         return world.movables.poses[found[0]] if len(found) else None
 
     def _on_the_way(self, way: Legs | FloatArray) -> Follower:
@@ -171,7 +170,7 @@ class PlaceExecution:
         poses = np.vstack([poses, beyond[1:]])
         path = poses_of(poses, seen)
         path[:, 2] = poses[:, 2]
-        plan = PushPath(path).plan(self._robot, self.label)
+        plan = PushPath(path).plan(self._robot, self.push.label)
         pusher = PushingMpc(
             PushingConfig(
                 parameters=PushParameters(self._grip),

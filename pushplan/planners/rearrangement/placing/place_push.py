@@ -335,15 +335,15 @@ class PlacePushes:
         scene = self._scene
         here = scene.poses[k]
         pairs = sorted(
-            (scene.pushes(contact).length(contact.robot_at(here), contact.robot_at(goal)), i, j)
+            (scene.pushes(contact).length(contact.robot_at(here), end), i, j)
             for i, contact in enumerate(scene.contacts[k])
-            for j, goal in enumerate(scene.goal_poses(k))
+            for j, end in enumerate(scene.ends(k, contact))
         )
         tried = 0
         for length, i, j in pairs:
             contact = scene.contacts[k][i]
             start = contact.robot_at(here)
-            target = contact.robot_at(scene.goal_poses(k)[j])
+            target = scene.ends(k, contact)[j]
             runs = [scene.runs(k, pose, contact) for pose in (start, target)]
             failed = self._history.cost(scene, k, contact, True)
             if math.isinf(failed) or not all(run is not None and run[0] for run in runs):
@@ -413,6 +413,9 @@ class PlacePushes:
         size = scene.size
         others = [shape for j, shape in enumerate(scene.shapes) if j != k]
         for contact in scene.contacts[k]:
+            failed = self._history.cost(scene, k, contact, False)
+            if math.isinf(failed):
+                continue
             start = contact.robot_at(scene.poses[k])
             for length in _LENGTHS:
                 poses = scene.pushes(contact).poses(start, ahead_of(start, length * size))
@@ -440,7 +443,4 @@ class PlacePushes:
                 wanted = scene.wanted_shapes.items()
                 if any(j != k and shape.distance(s) < 0.2 * size for j, s in wanted):
                     cost += _IN_THE_WAY
-                penalty = cost * size + self._history.cost(scene, k, contact, False)
-                if math.isinf(penalty):
-                    continue
-                yield self._push(k, way, length * size, rest, penalty, True)
+                yield self._push(k, way, length * size, rest, cost * size + failed, True)

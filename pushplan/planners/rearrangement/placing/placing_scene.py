@@ -161,9 +161,12 @@ class PlacingScene:
 
     def objects_but(self, k: int) -> core.ConvexObstacles:
         """All objects but ``k``."""
+        return obstacles(self.empty, self._parts_but(k))
+
+    def _parts_but(self, k: int) -> list[FloatArray]:
+        """The convex parts of all objects but ``k``; of all if it is -1."""
         others = range(len(self.movables))
-        parts = [part for j in others if j != k for part in self.movables.parts_world(j)]
-        return obstacles(self.empty, parts)
+        return [part for j in others if j != k for part in self.movables.parts_world(j)]
 
     def alone(self, k: int) -> core.CollisionChecker:
         """Checks the robot alone, in `among`."""
@@ -171,13 +174,7 @@ class PlacingScene:
 
     def _others(self, k: int) -> tuple[core.ConvexObstacles, core.CollisionChecker]:
         if k not in self._bodies:
-            others = [
-                part
-                for j in range(len(self.movables))
-                if j != k
-                for part in self.movables.parts_world(j)
-            ]
-            among = obstacles(self.world.static, others)
+            among = obstacles(self.world.static, self._parts_but(k))
             self._bodies[k] = among, core.CollisionChecker(footprint(self.robot), among)
         return self._bodies[k]
 
@@ -224,6 +221,6 @@ class PlacingScene:
 
     def _graph(self, clearance: float) -> VisibilityGraph:
         static = self.world.static
-        parts = [p for j in range(len(self.movables)) for p in self.movables.parts_world(j)]
+        parts = self._parts_but(-1)
         solid = StaticMap((*static.polygons, *parts), static.segments, static.radii, static.bounds)
         return VisibilityGraph(solid, clearance)
