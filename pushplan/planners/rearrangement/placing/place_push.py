@@ -27,8 +27,8 @@ _PER_OBJECT = 4  # free pushes of an object that are kept
 _LOOKED_AT = 40  # pushes of an object that are checked for them
 _FAILED = 3.5  # cost of a push for each time that it has failed
 _MOST_FAILURES = 3  # after so many it waits until another push has succeeded
-_WAITS = 6  # for so many others an object is in the way that has just made room
-_IN_THE_WAY = 9.0  # cost of an end on the place of another object, or in its way
+_IN_THE_WAY = 18.0  # cost of an end on the place of another object, or in its only way
+_ROOM_COST = 10.0  # of moving an object out of the way
 _SHOVES = 28.0  # cost of a push that carries other objects along
 _TIGHT = 2.0  # of one that passes other objects closely
 _NEIGHBOURS = 2.5  # distance from the objects that are left, of those that are shoved for them
@@ -172,34 +172,51 @@ class PlacePushes:
         self._history = history
         self._checkers: dict[tuple[int, int, bool], core.CollisionChecker] = {}
         self._blocked: dict[int, PlacePush] = {}
+        self._waiting: list[PlacePush] = []
 
     def towards_places(self) -> list[PlacePush]:
         """Pushes of the objects that are left, along a curve or straight on.
 
         Straight pushes are followed by others: they bring an object to where the curve to its place
         is clear (pre-relocation, Talia et al., "ReloPush", ICRA 2025), or mend what the last push
-        has missed.
+        has missed. Objects that have made room for others wait for these, see `of_waiting`.
         """
-        found = {k: self._of_object(k) for k in self._scene.left}
-        best = {
-            k: min(own, key=lambda push: push.cost) for k, own in found.items() if own
-        } | self._blocked
-        pushes = list(self._blocked.values())
-        for k, own in found.items():
-            place = self._scene.goal.poses[self._scene.places[k]]
-            others = [push for j, push in best.items() if j != k]
-            at_place = self._blocks(k, place, others)
-            waits = _WAITS * self._history.waits_for(self._scene, k)
+        scene = self._scene
+        found = {k: self._of_object(k) for k in scene.left}
+        offered = {
+            k: own or [self._blocked[k]] for k, own in found.items() if own or k in self._blocked
+        }
+        self._waiting = []
+        pushes = []
+        for k, own in offered.items():
+            others = [theirs for j, theirs in offered.items() if j != k]
+            at_place = self._hindrance(k, scene.goal.poses[scene.places[k]], others)
+            mine = []
             for push in own:
-                early = at_place + waits
+                early = at_place
                 if not push.final:
-                    early = max(early, self._blocks(k, push.object_pose, others))
-                pushes.append(replace(push, early=early * _IN_THE_WAY * self._scene.size))
+                    early = max(early, self._hindrance(k, push.object_pose, others))
+                mine.append(replace(push, early=early))
+            if self._history.waits_for(scene, k):
+                self._waiting += mine
+            else:
+                pushes += mine
         return pushes
 
-    def _blocks(self, k: int, pose: FloatArray, pushes: list[PlacePush]) -> int:
-        """Count the pushes that object ``k`` would block at a pose (3,)."""
-        return sum(not self._is_clear_of(push, k, pose) for push in pushes)
+    def of_waiting(self) -> list[PlacePush]:
+        """What `towards_places` has left out."""
+        return self._waiting
+
+    def _hindrance(self, k: int, pose: FloatArray, others: list[list[PlacePush]]) -> float:
+        """By how much more the other objects cost once object ``k`` is at a pose (3,) [m]."""
+        most = _IN_THE_WAY * self._scene.size
+        total = 0.0
+        for pushes in others:
+            ranked = sorted(pushes, key=lambda push: push.cost)
+            least = ranked[0].cost
+            clear = (push.cost for push in ranked if self._is_clear_of(push, k, pose))
+            total += min(next(clear, math.inf) - least, most)
+        return total
 
     def _is_clear_of(self, push: PlacePush, k: int, pose: FloatArray) -> bool:
         """True if a push and the next are clear of object ``k`` at a pose (3,)."""
@@ -213,25 +230,29 @@ class PlacePushes:
         )
 
     def _of_object(self, k: int) -> list[PlacePush]:
-        """The cheapest free pushes; the cheapest one that others block is kept for later."""
+        """The cheapest free pushes; without any, one that others block is kept for later."""
         kept: list[PlacePush] = []
+        blocked: list[PlacePush] = []
         options = [option for option in self._options(k) if math.isfinite(option.bound)]
         options.sort(key=lambda option: option.bound)
         for option in options[:_LOOKED_AT]:
             push = self._checked(k, option)
-            if push is None:
-                continue
-            if push.free:
-                kept.append(push)
-            elif k not in self._blocked:
-                self._blocked[k] = push
+            if push is not None:
+                (kept if push.free else blocked).append(push)
             if len(kept) >= _PER_OBJECT:
                 break
         if not any(push.final for push in kept):
             kept += self._around(k)
-        if kept:
-            self._blocked.pop(k, None)
+        if not kept and blocked:
+            self._blocked[k] = min(blocked[:_PER_OBJECT], key=self._cost_of_room)
         return kept
+
+    def _cost_of_room(self, push: PlacePush) -> float:
+        """Of a push that others block, after these have been moved out of the way [m]."""
+        poses = self._scene.poses
+        others = (j for j in range(len(poses)) if j != push.k)
+        count = sum(not self._is_clear_of(push, j, poses[j]) for j in others)
+        return push.cost + count * _ROOM_COST * self._scene.size
 
     def _options(self, k: int) -> Iterator[_Option]:
         scene = self._scene

@@ -129,7 +129,12 @@ class Placer:
         if not scene.left:
             return way_to(scene, scene.robot_goal)
         pushes = PlacePushes(scene, self._history)
-        for options in (pushes.towards_places, pushes.making_room, pushes.shoves):
+        for options in (
+            pushes.towards_places,
+            pushes.making_room,
+            pushes.of_waiting,
+            pushes.shoves,
+        ):
             choice = first_push(scene, options(), self.config.order, self._rng)
             if choice is not None:
                 return choice
