@@ -24,6 +24,7 @@ from pushplan.world import (
     Drive,
     GoalPose,
     InvalidInputError,
+    MaxIterations,
     Movables,
     ObjectGoals,
     StaticMap,
@@ -177,6 +178,31 @@ def test_an_object_in_the_way_is_moved_first() -> None:
     assert choice is not None
     moved = choice.push.object_pose
     assert math.dist(moved[:2], (0.5, 0.0)) > 0.1
+
+
+def test_an_object_whose_place_blocks_another_comes_later() -> None:
+    world = scene_of([(0.0, 0.0, 0.0), (0.0, 0.6, 0.0)], [(1.0, 0.0, 0.0), (0.6, 0.0, 0.0)])
+    scene = PlacingScene(world, 0.4)
+    pushes = PlacePushes(scene, PlacingHistory()).towards_places()
+    assert max(push.early for push in pushes if push.k == 0 and push.final) == 0.0
+    assert min(push.early for push in pushes if push.k == 1) > 0.0
+    choice = first_push(scene, pushes, "gtsp", np.random.default_rng(0))
+    assert choice is not None and choice.push.k == 0
+
+
+def test_an_object_that_has_made_room_waits() -> None:
+    world = scene_of([(0.0, 0.0, 0.0), (0.0, 0.6, 0.0)], [(0.5, 0.0, 0.0), (0.5, 0.6, 0.0)])
+    pushes = PlacePushes(PlacingScene(world, 0.4), PlacingHistory(waits={0: 1}))
+    assert {push.k for push in pushes.towards_places()} == {1}
+    assert {push.k for push in pushes.of_waiting()} == {0}
+
+
+def test_a_stop_rule_leaves_out_what_is_far_away() -> None:
+    world = scene_of([(0.8, 0.8, 0.0), (-0.5, -0.6, 0.0)], [(0.5, 0.0, 0.0), (0.0, -0.6, 0.0)])
+    scene = PlacingScene(world, 0.4)
+    pushes = PlacePushes(scene, PlacingHistory(), MaxIterations(1)).towards_places()
+    assert {push.k for push in pushes} == {1}
+    assert first_push(scene, pushes, "gtsp", np.random.default_rng(0)) is not None
 
 
 def test_pushes_that_have_failed_are_left_out() -> None:

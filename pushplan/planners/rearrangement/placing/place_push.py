@@ -15,9 +15,11 @@ from pushplan.motion.collision import obstacles
 from pushplan.planners.rearrangement.placing.contact import Contact, ahead_of
 from pushplan.planners.rearrangement.placing.curves import is_clear, way_around
 from pushplan.planners.rearrangement.placing.placing_scene import PlacingScene
+from pushplan.world import Stop
 from pushplan.world.checks import FloatArray
 from pushplan.world.outline import transform
 from pushplan.world.polyline import path_length
+from pushplan.world.stop import StopCheck
 
 # All lengths in circumscribed radii.
 _LENGTHS = (0.85, 1.8, 3.2, 5.0, 7.5)  # of straight pushes
@@ -46,6 +48,15 @@ class Part(NamedTuple):
     contact: Contact
     poses: FloatArray  # (N, 3) of the robot
     runs: FloatArray  # (M, 3) of it before contact and after the push
+
+    def passes(self, pose: FloatArray, radius: float) -> bool:
+        """True if robot or object may come so near to a point [m]."""
+        reach = radius + self.contact.wide.radius
+        x, y = pose[:2].tolist()
+        return any(
+            float(((poses[:, 0] - x) ** 2 + (poses[:, 1] - y) ** 2).min()) < reach * reach
+            for poses in (self.poses, self.runs)
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,17 +170,26 @@ class _Option(NamedTuple):
     penalty: float
 
 
+_Found = dict[int, tuple[list[PlacePush], list[PlacePush]]]
+"""By object: free pushes, and pushes that others block."""
+
+
 class PlacePushes:
     """The pushes of a scene.
 
     Args:
         scene: the scene.
         history: of what was tried.
+        stop: ends the search for pushes once one is known, counted in pushes that are checked.
     """
 
-    def __init__(self, scene: PlacingScene, history: PlacingHistory) -> None:
+    def __init__(
+        self, scene: PlacingScene, history: PlacingHistory, stop: Stop | None = None
+    ) -> None:
         self._scene = scene
         self._history = history
+        self._check: StopCheck | None = None if stop is None else stop.start()
+        self._count = 0
         self._checkers: dict[tuple[int, int, bool], core.CollisionChecker] = {}
         self._blocked: dict[int, PlacePush] = {}
         self._waiting: list[PlacePush] = []
@@ -182,10 +202,7 @@ class PlacePushes:
         has missed. Objects that have made room for others wait for these, see `of_waiting`.
         """
         scene = self._scene
-        found = {k: self._of_object(k) for k in scene.left}
-        offered = {
-            k: own or [self._blocked[k]] for k, own in found.items() if own or k in self._blocked
-        }
+        offered = self._offered()
         self._waiting = []
         pushes = []
         for k, own in offered.items():
@@ -221,31 +238,61 @@ class PlacePushes:
     def _is_clear_of(self, push: PlacePush, k: int, pose: FloatArray) -> bool:
         """True if a push and the next are clear of object ``k`` at a pose (3,)."""
         scene = self._scene
+        radius = float(scene.movables.radii[k])
+        near = [part for part in push.way if part.passes(pose, radius)]
+        if not near:
+            return True
         there = obstacles(scene.empty, [transform(pose, part) for part in scene.movables.parts(k)])
         alone = core.CollisionChecker(scene.alone_body, there)
         return all(
             is_clear(core.CollisionChecker(part.contact.wide, there), part.poses)
             and is_clear(alone, part.runs)
-            for part in push.way
+            for part in near
         )
 
-    def _of_object(self, k: int) -> list[PlacePush]:
-        """The cheapest free pushes; without any, one that others block is kept for later."""
+    def _offered(self) -> dict[int, list[PlacePush]]:
+        """Free pushes of the objects that are left; where there are none, one that is blocked.
+
+        The objects near the robot come first, and ways around after all that is simpler, so that a
+        stop rule leaves out what matters least.
+        """
+        scene = self._scene
+        away = np.hypot(*(scene.poses - scene.world.robot_pose)[:, :2].T)
+        found: _Found = {}
+        for k in sorted(scene.left, key=lambda k: (away[k], k)):
+            if self._ended(found):
+                break
+            found[k] = self._of_object(k)
+        for k, (kept, _) in found.items():
+            if not any(push.final for push in kept) and not self._ended(found):
+                kept += self._around(k)
+        for k, (kept, blocked) in found.items():
+            if blocked and not kept:
+                self._blocked[k] = min(blocked[:_PER_OBJECT], key=self._cost_of_room)
+                kept.append(self._blocked[k])
+        return {k: found[k][0] for k in scene.left if k in found and found[k][0]}
+
+    def _ended(self, found: _Found) -> bool:
+        """True if the stop rule has ended the search, and a free push is known."""
+        costs = [push.cost for kept, _ in found.values() for push in kept]
+        if self._check is None or not costs:
+            return False
+        return self._check(self._count, min(costs))
+
+    def _of_object(self, k: int) -> tuple[list[PlacePush], list[PlacePush]]:
+        """The cheapest free pushes, and cheaper ones that others block."""
         kept: list[PlacePush] = []
         blocked: list[PlacePush] = []
         options = [option for option in self._options(k) if math.isfinite(option.bound)]
         options.sort(key=lambda option: option.bound)
         for option in options[:_LOOKED_AT]:
+            self._count += 1
             push = self._checked(k, option)
             if push is not None:
                 (kept if push.free else blocked).append(push)
             if len(kept) >= _PER_OBJECT:
                 break
-        if not any(push.final for push in kept):
-            kept += self._around(k)
-        if not kept and blocked:
-            self._blocked[k] = min(blocked[:_PER_OBJECT], key=self._cost_of_room)
-        return kept
+        return kept, blocked
 
     def _cost_of_room(self, push: PlacePush) -> float:
         """Of a push that others block, after these have been moved out of the way [m]."""
@@ -404,14 +451,18 @@ class PlacePushes:
     def making_room(self) -> list[PlacePush]:
         """Straight pushes of objects that are in the way of others, out of it."""
         found = []
+        moves: dict[int, list[PlacePush]] = {}
         for push in self._blocked.values():
             for k in range(len(self._scene.movables)):
-                if k != push.k and not self._is_clear_of(push, k, self._scene.poses[k]):
-                    found += [
-                        replace(move, favours=push.label)
-                        for move in self._moves(k)
-                        if self._is_clear_of(push, k, move.object_pose)
-                    ]
+                if k == push.k or self._is_clear_of(push, k, self._scene.poses[k]):
+                    continue
+                if k not in moves:
+                    moves[k] = list(self._moves(k))
+                found += [
+                    replace(move, favours=push.label)
+                    for move in moves[k]
+                    if self._is_clear_of(push, k, move.object_pose)
+                ]
         return found
 
     def shoves(self) -> list[PlacePush]:

@@ -95,7 +95,7 @@ class Placer:
         if self._call is None:
             scene = PlacingScene(world, self._grip)
             self._call = self.executor.submit(
-                lambda stop: self._best(scene), world.time, self._stop
+                lambda stop: self._best(scene, stop), world.time, self._stop
             )
         if not self._call.ready(world.time):
             return False
@@ -124,11 +124,13 @@ class Placer:
         if not PlacingScene(world, self._grip).alone_wide.is_free(world.robot_pose):
             self._recover(world)
 
-    def _best(self, scene: PlacingScene) -> PlaceChoice | Legs | FloatArray | None:
+    def _best(
+        self, scene: PlacingScene, stop: Stop | None
+    ) -> PlaceChoice | Legs | FloatArray | None:
         """The next push, or the way to the robot's own goal."""
         if not scene.left:
             return way_to(scene, scene.robot_goal)
-        pushes = PlacePushes(scene, self._history)
+        pushes = PlacePushes(scene, self._history, stop)
         for options in (
             pushes.towards_places,
             pushes.making_room,
