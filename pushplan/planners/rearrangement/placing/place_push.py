@@ -191,7 +191,7 @@ class PlacePushes:
         self._check: StopCheck | None = None if stop is None else stop.start()
         self._count = 0
         self._checkers: dict[tuple[int, int, bool], core.CollisionChecker] = {}
-        self._blocked: dict[int, PlacePush] = {}
+        self._blocked: dict[int, list[PlacePush]] = {}
         self._waiting: list[PlacePush] = []
 
     def towards_places(self) -> list[PlacePush]:
@@ -268,8 +268,8 @@ class PlacePushes:
                 kept += self._around(k)
         for k, (kept, blocked) in found.items():
             if blocked and not kept:
-                self._blocked[k] = min(blocked[:_PER_OBJECT], key=self._cost_of_room)
-                kept.append(self._blocked[k])
+                self._blocked[k] = sorted(blocked[:_PER_OBJECT], key=self._cost_of_room)
+                kept.append(self._blocked[k][0])
         return {k: found[k][0] for k in scene.left if k in found and found[k][0]}
 
     def _ended(self, found: _Found) -> bool:
@@ -450,20 +450,29 @@ class PlacePushes:
 
     def making_room(self) -> list[PlacePush]:
         """Straight pushes of objects that are in the way of others, out of it."""
-        found = []
         moves: dict[int, list[PlacePush]] = {}
-        for push in self._blocked.values():
-            for k in range(len(self._scene.movables)):
-                if k == push.k or self._is_clear_of(push, k, self._scene.poses[k]):
-                    continue
-                if k not in moves:
-                    moves[k] = list(self._moves(k))
-                found += [
-                    replace(move, favours=push.label)
-                    for move in moves[k]
-                    if self._is_clear_of(push, k, move.object_pose)
-                ]
+        found = []
+        for pushes in self._blocked.values():
+            rooms = [self._room_for(push, moves) for push in pushes]
+            found += next((room for room, enough in rooms if enough), rooms[0][0])
         return found
+
+    def _room_for(
+        self, push: PlacePush, moves: dict[int, list[PlacePush]]
+    ) -> tuple[list[PlacePush], bool]:
+        """Moves out of the way of a push, and if there is one for all that is in its way."""
+        scene = self._scene
+        found = []
+        enough = True
+        for k in range(len(scene.movables)):
+            if k == push.k or self._is_clear_of(push, k, scene.poses[k]):
+                continue
+            if k not in moves:
+                moves[k] = list(self._moves(k))
+            room = [move for move in moves[k] if self._is_clear_of(push, k, move.object_pose)]
+            enough = enough and len(room) > 0
+            found += [replace(move, favours=push.label) for move in room]
+        return found, enough
 
     def shoves(self) -> list[PlacePush]:
         """Straight pushes of objects that are left or near these, whatever they carry along."""

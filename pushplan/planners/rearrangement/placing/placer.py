@@ -47,7 +47,7 @@ class Placer:
         self._to_goal: Transit | None = None
         self._history = PlacingHistory()
         self._rng = rng
-        self._was_done = False
+        self._most_done = 0
         self._look_at = -math.inf
         self._wait = _WAIT
         self._grip = config.grip
@@ -113,7 +113,6 @@ class Placer:
             if push.favours is not None:
                 self._history.waits[push.label] = push.favours
             self._execution = PlaceExecution(choice, world.robot, self.config, self._grip)
-            self._was_done = bool(world.completed[world.movables.ids == push.label][0])
         return True
 
     def _give_up(self, world: World) -> None:
@@ -143,16 +142,17 @@ class Placer:
         return None
 
     def _close(self, world: World, execution: PlaceExecution) -> None:
-        """Note whether the push has brought its object home."""
+        """Note what the push has done."""
         self._execution = None
         push = execution.push
         if abs(execution.slip) > _SLIPPED * world.robot.circumscribed_radius:
             self._grip = max(_LESS_GRIP * self._grip, _LEAST_GRIP * self.config.grip)
-        done = world.completed[world.movables.ids == push.label]
-        if done.all() and not self._was_done:
+        done = int(np.sum(world.completed))
+        if done > self._most_done:
+            self._most_done = done
             self._history.failures.clear()
             self._retreats = 0
-        else:
+        elif not (push.final and world.completed[world.movables.ids == push.label].all()):
             self._history.count(push)
         if execution.stuck:
             self._recover(world)
