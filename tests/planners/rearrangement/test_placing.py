@@ -99,6 +99,28 @@ def test_robot_and_object_fit_together_in_contact() -> None:
     assert contacts[0].radius == pytest.approx(reach / (0.7 * 0.4), rel=1e-6)
 
 
+def test_contacts_beside_the_middle_keep_the_face_on_the_bumper() -> None:
+    movables = Movables.from_outlines([BOX], np.zeros((1, 3)), density=10.0)
+    middle = contacts_of(PUSHER, movables, 0, 0.4)
+    beside = contacts_of(PUSHER, movables, 0, 0.4, beside=True)
+    assert len(beside) == 2 * len(middle)
+    for contact in beside:
+        offset = abs(float(contact.object_pose[1]))
+        assert 0.0 < offset and offset + 0.05 <= contact.model.bumper.half
+        assert contact.radius == pytest.approx(middle[0].radius + offset)
+
+
+def test_an_object_beside_others_is_pushed_by_the_side_of_the_bumper() -> None:
+    row = [(x, 0.135, 0.0) for x in np.arange(-0.45, 0.85, 0.1)]
+    world = scene_of([(0.0, 0.0, 0.0), *row], [(0.4, 0.0, 0.0)])
+    middle, everywhere = (
+        PlacePushes(PlacingScene(world, 0.4, thorough=thorough), PlacingHistory()).towards_places()
+        for thorough in (False, True)
+    )
+    assert not any(push.free for push in middle)
+    assert any(push.free for push in everywhere)
+
+
 def test_less_friction_makes_wider_curves() -> None:
     movables = Movables.from_outlines([BOX], np.zeros((1, 3)))
     wide, narrow = (contacts_of(PUSHER, movables, 0, mu)[0].radius for mu in (0.2, 0.4))
@@ -200,7 +222,7 @@ def test_an_object_that_has_made_room_waits() -> None:
 def test_a_stop_rule_leaves_out_what_is_far_away() -> None:
     world = scene_of([(0.8, 0.8, 0.0), (-0.5, -0.6, 0.0)], [(0.5, 0.0, 0.0), (0.0, -0.6, 0.0)])
     scene = PlacingScene(world, 0.4)
-    pushes = PlacePushes(scene, PlacingHistory(), MaxIterations(1)).towards_places()
+    pushes = PlacePushes(scene, PlacingHistory(), MaxIterations(1).start()).towards_places()
     assert {push.k for push in pushes} == {1}
     assert first_push(scene, pushes, "gtsp", np.random.default_rng(0)) is not None
 

@@ -21,12 +21,13 @@ from pushplan.world.outline import convex_outline, flatten, transform
 _FRACTION = 0.7  # of the stable curvature that is used
 _LEAST_FACE = 0.2  # shortest face that is pushed [half widths of the bumper]
 MARGIN = 0.07  # that robot and object keep from other objects [circumscribed radii]
+_BESIDE = 0.8  # offset of a contact beside the middle, of what keeps the face on the bumper
 _STRAIGHT = 1e-3  # curvature below which a face does not hold [1/circumscribed radii]
 
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """An object that lies with the middle of a face on the middle of the bumper.
+    """An object that lies with a face on the bumper.
 
     While friction holds it there, robot and object are one body, which turns on a radius of the
     stable curvature at least (Lynch and Mason, "Stable pushing", IJRR 15(6), 1996).
@@ -60,19 +61,30 @@ class Contact:
 
 
 def contacts_of(
-    robot: RobotModel, movables: Movables, k: int, friction: float
+    robot: RobotModel, movables: Movables, k: int, friction: float, *, beside: bool = False
 ) -> tuple[Contact, ...]:
-    """The contacts of object ``k`` that the robot can push at, one for each face of its hull."""
+    """The contacts of object ``k`` that the robot can push at, one for each face of its hull.
+
+    Args:
+        robot: the robot.
+        movables: the objects.
+        k: index of one.
+        friction: Coulomb coefficient between robot and object.
+        beside: not with the middle of a face on the middle of the bumper, but to its left and right
+            as far as all of the face is on it.
+    """
     compound = len(movables.parts(k)) > 1 or movables.gyration_radii[k] > 0.0
     radius = 0.0
     if compound:
         radius = math.sqrt(gyration_squares(movables.select([k]))[0])
-    return _contacts(robot, np.ascontiguousarray(movables.outline(k)).tobytes(), radius, friction)
+    return _contacts(
+        robot, np.ascontiguousarray(movables.outline(k)).tobytes(), radius, friction, beside
+    )
 
 
 @functools.lru_cache(maxsize=256)
 def _contacts(
-    robot: RobotModel, corners: bytes, radius: float, friction: float
+    robot: RobotModel, corners: bytes, radius: float, friction: float, beside: bool
 ) -> tuple[Contact, ...]:
     outline = convex_outline("outline", np.frombuffer(corners).reshape(-1, 2))
     size = robot.circumscribed_radius
@@ -85,11 +97,16 @@ def _contacts(
         curvature = _FRACTION * model.stable_curvature()
         if curvature < _STRAIGHT / size:
             continue
-        pose = np.array([model.reach, -0.5 * (face.low + face.high), -face.normal])
-        parts = [*robot.wall_parts, transform(pose, outline)]
-        turning = max(1.0 / curvature, robot.min_turning_radius)
-        bodies = body_of(parts, 0.0), body_of(parts, MARGIN * size)
-        found.append(Contact(model, turning, pose, *bodies))
+        middle = -0.5 * (face.low + face.high)
+        most = _BESIDE * max(0.0, half - 0.5 * (face.high - face.low))
+        if beside and most < _LEAST_FACE * half:
+            continue
+        for offset in (most, -most) if beside else (0.0,):
+            pose = np.array([model.reach, middle + offset, -face.normal])
+            parts = [*robot.wall_parts, transform(pose, outline)]
+            turning = max(1.0 / curvature + abs(offset), robot.min_turning_radius)
+            bodies = body_of(parts, 0.0), body_of(parts, MARGIN * size)
+            found.append(Contact(model, turning, pose, *bodies))
     return tuple(found)
 
 

@@ -150,7 +150,7 @@ class PlaceExecution:
         seen[2] = planned[2] + math.remainder(seen[2] - planned[2], math.tau)
         end = compose(self._goal, inverse(seen))
         if not push.final:
-            end = ahead_of(here, push.length)
+            end = compose(here, compose(inverse(push.poses[0]), push.poses[-1]))
         shortest = turning.length(push.poses[0], push.poses[-1])
         if push.length - shortest < 2.0 * step:  # else it leads around something
             if turning.length(here, end) <= _LONGER * push.length + 2.0 * step:

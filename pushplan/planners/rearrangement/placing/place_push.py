@@ -12,17 +12,16 @@ import numpy as np
 
 from pushplan.core import motion as core
 from pushplan.motion.collision import obstacles
-from pushplan.planners.rearrangement.placing.contact import Contact, ahead_of
+from pushplan.planners.rearrangement.placing.contact import Contact
 from pushplan.planners.rearrangement.placing.curves import is_clear, way_around
 from pushplan.planners.rearrangement.placing.placing_scene import PlacingScene
-from pushplan.world import Stop
 from pushplan.world.checks import FloatArray
 from pushplan.world.outline import transform
 from pushplan.world.polyline import path_length
 from pushplan.world.stop import StopCheck
 
 # All lengths in circumscribed radii.
-_LENGTHS = (0.85, 1.8, 3.2, 5.0, 7.5)  # of straight pushes
+_LENGTHS = (0.85, 1.8, 3.2, 5.0, 7.5)  # of pushes that do not lead to a place
 _AGAIN = 3.5  # cost of one more push
 _LONGEST = 60.0  # push that is looked at
 _PER_OBJECT = 4  # free pushes of an object that are kept
@@ -180,26 +179,26 @@ class PlacePushes:
     Args:
         scene: the scene.
         history: of what was tried.
-        stop: ends the search for pushes once one is known, counted in pushes that are checked.
+        check: ends the search for pushes once one is known; iterations are pushes that are checked.
     """
 
     def __init__(
-        self, scene: PlacingScene, history: PlacingHistory, stop: Stop | None = None
+        self, scene: PlacingScene, history: PlacingHistory, check: StopCheck | None = None
     ) -> None:
         self._scene = scene
         self._history = history
-        self._check: StopCheck | None = None if stop is None else stop.start()
+        self._check = check
         self._count = 0
         self._checkers: dict[tuple[int, int, bool], core.CollisionChecker] = {}
         self._blocked: dict[int, list[PlacePush]] = {}
         self._waiting: list[PlacePush] = []
 
     def towards_places(self) -> list[PlacePush]:
-        """Pushes of the objects that are left, along a curve or straight on.
+        """Pushes of the objects that are left, to their places or not.
 
-        Straight pushes are followed by others: they bring an object to where the curve to its place
-        is clear (pre-relocation, Talia et al., "ReloPush", ICRA 2025), or mend what the last push
-        has missed. Objects that have made room for others wait for these, see `of_waiting`.
+        Pushes elsewhere are followed by others: they bring an object to where the curve to its
+        place is clear (pre-relocation, Talia et al., "ReloPush", ICRA 2025), or mend what the last
+        push has missed. Objects that have made room for others wait for these, see `of_waiting`.
         """
         scene = self._scene
         offered = self._offered()
@@ -306,7 +305,7 @@ class PlacePushes:
         size = scene.size
         here = scene.poses[k]
         goal = scene.goal_poses(k)[0]
-        for contact in scene.contacts[k]:
+        for contact in scene.first_contacts[k]:
             start = contact.robot_at(here)
             turning = scene.pushes(contact)
             missed = self._history.cost(scene, k, contact, True)
@@ -320,8 +319,7 @@ class PlacePushes:
             lengths = {length * size for length in _LENGTHS}
             if along > 0.02 * size:
                 lengths.add(along)
-            for length in sorted(lengths):
-                target = ahead_of(start, length)
+            for length, target in scene.targets(start, contact, sorted(lengths)):
                 there = contact.object_at(target)
                 if self._is_close(k, there):
                     yield _Option(length + missed, contact, start, target, length, (), missed)
@@ -449,7 +447,7 @@ class PlacePushes:
         )
 
     def making_room(self) -> list[PlacePush]:
-        """Straight pushes of objects that are in the way of others, out of it."""
+        """Pushes of objects that are in the way of others, out of it."""
         moves: dict[int, list[PlacePush]] = {}
         found = []
         for pushes in self._blocked.values():
@@ -475,7 +473,7 @@ class PlacePushes:
         return found, enough
 
     def shoves(self) -> list[PlacePush]:
-        """Straight pushes of objects that are left or near these, whatever they carry along."""
+        """Pushes of objects that are left or near these, whatever they carry along."""
         scene = self._scene
         found = []
         for k in range(len(scene.movables)):
@@ -489,17 +487,18 @@ class PlacePushes:
         return found
 
     def _moves(self, k: int, shoves: bool = False) -> Iterator[PlacePush]:
-        """Straight pushes of an object to anywhere where there is room."""
+        """Pushes of an object to anywhere where there is room."""
         scene = self._scene
         size = scene.size
         others = [shape for j, shape in enumerate(scene.shapes) if j != k]
-        for contact in scene.contacts[k]:
+        lengths = [length * size for length in _LENGTHS]
+        for contact in scene.first_contacts[k]:
             failed = self._history.cost(scene, k, contact, False)
             if math.isinf(failed):
                 continue
             start = contact.robot_at(scene.poses[k])
-            for length in _LENGTHS:
-                poses = scene.pushes(contact).poses(start, ahead_of(start, length * size))
+            for length, target in scene.targets(start, contact, lengths):
+                poses = scene.pushes(contact).poses(start, target)
                 part = self._part(k, contact, poses)
                 if part is None or not (part[0] or shoves):
                     continue
@@ -524,4 +523,4 @@ class PlacePushes:
                 wanted = scene.wanted_shapes.items()
                 if any(j != k and shape.distance(s) < 0.2 * size for j, s in wanted):
                     cost += _IN_THE_WAY
-                yield self._push(k, way, length * size, rest, cost * size + failed, True)
+                yield self._push(k, way, length, rest, cost * size + failed, True)

@@ -129,12 +129,17 @@ class Placer:
         """The next push, or the way to the robot's own goal."""
         if not scene.left:
             return way_to(scene, scene.robot_goal)
-        pushes = PlacePushes(scene, self._history, stop)
+        check = None if stop is None else stop.start()
+        pushes = PlacePushes(scene, self._history, check)
+        thorough = PlacingScene(scene.world, scene.friction, thorough=True)
+        more = PlacePushes(thorough, self._history, check)
         for options in (
             pushes.towards_places,
             pushes.making_room,
-            pushes.of_waiting,
-            pushes.shoves,
+            more.towards_places,
+            more.making_room,
+            more.of_waiting,
+            more.shoves,
         ):
             choice = first_push(scene, options(), self.config.order, self._rng)
             if choice is not None:

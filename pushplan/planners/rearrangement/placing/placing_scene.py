@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator
 from functools import cached_property
 
 import numpy as np
@@ -37,9 +38,11 @@ class PlacingScene:
     Args:
         world: the snapshot, with a goal of `ObjectGoals`.
         friction: Coulomb coefficient between robot and objects.
+        thorough: to begin with, objects are also pushed beside the middle of the bumper and in
+            curves that do not lead to their places.
     """
 
-    def __init__(self, world: World, friction: float) -> None:
+    def __init__(self, world: World, friction: float, *, thorough: bool = False) -> None:
         goal = world.goal
         assert isinstance(goal, ObjectGoals)
         self.world = world
@@ -48,6 +51,7 @@ class PlacingScene:
         self.movables = world.movables
         self.size = world.robot.circumscribed_radius
         self.friction = friction
+        self.thorough = thorough
         self.poses: FloatArray = world.movables.poses
         self.walls = obstacles(world.static)
         self._graphs: dict[float, VisibilityGraph] = {}
@@ -72,9 +76,22 @@ class PlacingScene:
 
     @cached_property
     def contacts(self) -> tuple[tuple[Contact, ...], ...]:
-        """The contacts of each object."""
-        count = len(self.movables)
-        return tuple(contacts_of(self.robot, self.movables, k, self.friction) for k in range(count))
+        """The contacts of each object in the middle of the bumper."""
+        return self._contacts(beside=False)
+
+    @cached_property
+    def first_contacts(self) -> tuple[tuple[Contact, ...], ...]:
+        """The contacts of each object by which a push may begin."""
+        if not self.thorough:
+            return self.contacts
+        both = zip(self.contacts, self._contacts(beside=True), strict=True)
+        return tuple((*middle, *beside) for middle, beside in both)
+
+    def _contacts(self, *, beside: bool) -> tuple[tuple[Contact, ...], ...]:
+        return tuple(
+            contacts_of(self.robot, self.movables, k, self.friction, beside=beside)
+            for k in range(len(self.movables))
+        )
 
     @cached_property
     def is_car(self) -> bool:
@@ -90,6 +107,17 @@ class PlacingScene:
     def pushes(self, contact: Contact) -> Turning:
         """Turning of robot and object together."""
         return Turning(contact.radius, False, _STEP * self.size)
+
+    def targets(
+        self, start: FloatArray, contact: Contact, lengths: Iterable[float]
+    ) -> Iterator[tuple[float, FloatArray]]:
+        """Pushes that do not lead to a place: length [m], and pose (3,) of the robot after it."""
+        curvatures = (0.0, 1.0 / contact.radius, -1.0 / contact.radius)
+        for length in lengths:
+            for curvature in curvatures if self.thorough else curvatures[:1]:
+                target = np.empty(3)
+                core.along_arc(start, length, curvature, target)
+                yield length, target
 
     def goal_poses(self, k: int) -> list[FloatArray]:
         """Poses (3,) at which object ``k`` is at its place."""
