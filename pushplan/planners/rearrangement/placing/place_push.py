@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import heapq
+import itertools
 import math
 from collections import Counter
 from collections.abc import Iterator
@@ -38,6 +40,8 @@ _SPACE_COST = 7.0  # cost where there is none of it
 _DONE = 7.0  # cost of moving an object that is done
 _AROUND = 3  # pairs of face and heading for which ways around are looked for
 _FOLLOWING = 6  # curves after a push that are looked at
+_EXPANDED = 60  # poses from which several pushes are looked for
+_CELL = 0.1  # poses that are nearer count as the same [circumscribed radii, rad]
 _CLOSE_ENOUGH = (0.6, 0.8)  # errors of place and heading, in tolerances, that need no next push
 
 
@@ -169,6 +173,8 @@ class _Option(NamedTuple):
     penalty: float
 
 
+_Node = tuple[float, int, float, FloatArray, tuple[Part, ...], bool]
+"""Of a search: least cost, its number, cost until then [m], the object's pose, pushes, the end."""
 _Found = dict[int, tuple[list[PlacePush], list[PlacePush]]]
 """By object: free pushes, and pushes that others block."""
 
@@ -265,6 +271,8 @@ class PlacePushes:
         for k, (kept, _) in found.items():
             if not any(push.final for push in kept) and not self._ended(found):
                 kept += self._around(k)
+            if self._scene.thorough and not kept and not self._ended(found):
+                kept += self._by_several(k)
         for k, (kept, blocked) in found.items():
             if blocked and not kept:
                 self._blocked[k] = sorted(blocked[:_PER_OBJECT], key=self._cost_of_room)
@@ -304,7 +312,6 @@ class PlacePushes:
         scene = self._scene
         size = scene.size
         here = scene.poses[k]
-        goal = scene.goal_poses(k)[0]
         for contact in scene.first_contacts[k]:
             start = contact.robot_at(here)
             turning = scene.pushes(contact)
@@ -314,12 +321,7 @@ class PlacePushes:
                 if length < _LONGEST * size:
                     yield _Option(length + missed, contact, start, end, length, (), missed)
             failed = self._history.cost(scene, k, contact, False)
-            heading = np.array([math.cos(start[2]), math.sin(start[2])])
-            along = float((goal[:2] - here[:2]) @ heading)
-            lengths = {length * size for length in _LENGTHS}
-            if along > 0.02 * size:
-                lengths.add(along)
-            for length, target in scene.targets(start, contact, sorted(lengths)):
+            for length, target in self._elsewhere(k, contact, start):
                 there = contact.object_at(target)
                 if self._is_close(k, there):
                     yield _Option(length + missed, contact, start, target, length, (), missed)
@@ -328,6 +330,19 @@ class PlacePushes:
                 if nexts:
                     bound = length + failed + nexts[0].length + _AGAIN * size
                     yield _Option(bound, contact, start, target, length, nexts, failed)
+
+    def _elsewhere(
+        self, k: int, contact: Contact, start: FloatArray
+    ) -> Iterator[tuple[float, FloatArray]]:
+        """Pushes of several lengths, and until the object is beside its place."""
+        size = self._scene.size
+        lengths = {length * size for length in _LENGTHS}
+        goal = self._scene.goal_poses(k)[0]
+        heading = np.array([math.cos(start[2]), math.sin(start[2])])
+        along = float((goal[:2] - contact.object_at(start)[:2]) @ heading)
+        if along > 0.02 * size:
+            lengths.add(along)
+        return self._scene.targets(start, contact, sorted(lengths))
 
     def _following(self, k: int, there: FloatArray) -> tuple[_Curve, ...]:
         """The shortest curves of object ``k`` from a pose (3,) to its place, not checked."""
@@ -426,6 +441,52 @@ class PlacePushes:
                 break
         return []
 
+    def _by_several(self, k: int) -> list[PlacePush]:
+        """The first of the pushes that bring an object to its place together, if any are found.
+
+        A best-first search over poses of the object. The last push is the curve to the place.
+        """
+        scene = self._scene
+        again = _AGAIN * scene.size
+        numbers = itertools.count()
+        heap: list[_Node] = [(0.0, next(numbers), 0.0, scene.poses[k], (), False)]
+        seen = set()
+        expanded = 0
+        while heap and expanded < _EXPANDED:
+            _, _, cost, here, way, placed = heapq.heappop(heap)
+            if placed:
+                first = path_length(way[0].poses[:, :2])
+                return [self._push(k, way, first, cost - first, 0.0, True)]
+            cell = tuple(
+                np.round([*(here[:2] / (_CELL * scene.size)), here[2] / _CELL]).astype(int)
+            )
+            if cell in seen:
+                continue
+            seen.add(cell)
+            expanded += 1
+            for contact in (scene.contacts if way else scene.first_contacts)[k]:
+                if not way and math.isinf(self._history.cost(scene, k, contact, False)):
+                    continue
+                start = contact.robot_at(here)
+                turning = scene.pushes(contact)
+                ends = [(turning.length(start, end), end, True) for end in scene.ends(k, contact)]
+                elsewhere = self._elsewhere(k, contact, start)
+                for length, target, last in (*ends, *((*one, False) for one in elsewhere)):
+                    if length > _LONGEST * scene.size:
+                        continue
+                    found = self._part(k, contact, turning.poses(start, target))
+                    if found is None or not found[0]:
+                        continue
+                    there = contact.object_at(target)
+                    curves = () if last else self._following(k, there)
+                    if not last and not curves:
+                        continue
+                    known = cost + length + (0.0 if last else again)
+                    bound = known + (0.0 if last else curves[0].length)
+                    node = bound, next(numbers), known, there, (*way, *found[1]), last
+                    heapq.heappush(heap, node)
+        return []
+
     def _checker(self, k: int, contact: Contact, others: bool) -> core.CollisionChecker:
         """Checks robot and object together, among what is static or all other objects."""
         key = k, id(contact), others
@@ -509,7 +570,7 @@ class PlacePushes:
                     found = self._next(k, self._following(k, there))
                     if found is None:
                         continue
-                    rest += found[1]
+                    rest += found[1] + found[0] * _ROOM_COST * size
                 shape = scene.shape_at(k, there)
                 space = min((shape.distance(other) for other in others), default=math.inf)
                 cost = _SPACE_COST * max(0.0, 1.0 - space / (_SPACE * size))
