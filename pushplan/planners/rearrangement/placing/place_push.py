@@ -32,6 +32,7 @@ _FAILED = 3.5  # cost of a push for each time that it has failed
 _MOST_FAILURES = 3  # after so many it waits until another push has succeeded
 _IN_THE_WAY = 18.0  # cost of an end on the place of another object, or in its only way
 _ROOM_COST = 10.0  # of moving an object out of the way
+_NO_RETURN = 30.0  # of one to where others block its push to its place
 _SHOVES = 28.0  # cost of a push that carries other objects along
 _TIGHT = 2.0  # of one that passes other objects closely
 _NEIGHBOURS = 2.5  # distance from the objects that are left, of those that are shoved for them
@@ -570,7 +571,7 @@ class PlacePushes:
                     found = self._next(k, self._following(k, there))
                     if found is None:
                         continue
-                    rest += found[1] + found[0] * _ROOM_COST * size
+                    rest += found[1] + found[0] * _NO_RETURN * size
                 shape = scene.shape_at(k, there)
                 space = min((shape.distance(other) for other in others), default=math.inf)
                 cost = _SPACE_COST * max(0.0, 1.0 - space / (_SPACE * size))
