@@ -204,8 +204,8 @@ class PlacePushes:
         """Pushes of the objects that are left, to their places or not.
 
         Pushes elsewhere are followed by others: they bring an object to where the curve to its
-        place is clear (pre-relocation, Talia et al., "ReloPush", ICRA 2025), or mend what the last
-        push has missed. Objects that have made room for others wait for these, see `of_waiting`.
+        place is clear (pre-relocation, Ahn and Mavrogiannis, "ReloPush", ICRA 2025), or mend what
+        the last push has missed. Objects that have made room wait, see `of_waiting`.
         """
         scene = self._scene
         offered = self._offered()

@@ -22,7 +22,7 @@ _MOST_ENDS = 3  # pushes and recoveries that may end in one step until the robot
 _RETREAT = 0.3  # distance that the robot backs off where it is stuck [circumscribed radii]
 _SLIPPED = 0.1  # way of an object on the bumper that shows too little grip [circumscribed radii]
 _LESS_GRIP = 0.75  # part of the grip that is counted on from then on
-_LEAST_GRIP = 0.25  # least part of that of the settings
+_LEAST_GRIP = 0.4  # least part of that of the settings
 _WAIT = 1.0  # time after which it looks again where there is no push [s]; then twice as long,
 _LONGEST_WAIT = 60.0  # and at most so long [s]
 
@@ -120,7 +120,7 @@ class Placer:
         self._history.failures.clear()
         self._look_at = world.time + self._wait
         self._wait = min(2.0 * self._wait, _LONGEST_WAIT)
-        if not PlacingScene(world, self._grip).alone_wide.is_free(world.robot_pose):
+        if not PlacingScene(world, self._grip).can_set_out:
             self._recover(world)
 
     def _best(
@@ -150,14 +150,15 @@ class Placer:
         """Note what the push has done."""
         self._execution = None
         push = execution.push
-        if abs(execution.slip) > _SLIPPED * world.robot.circumscribed_radius:
+        missed = not world.completed[world.movables.ids == push.label].all()
+        if missed and abs(execution.slip) > _SLIPPED * world.robot.circumscribed_radius:
             self._grip = max(_LESS_GRIP * self._grip, _LEAST_GRIP * self.config.grip)
         done = int(np.sum(world.completed))
         if done > self._most_done:
             self._most_done = done
             self._history.failures.clear()
             self._retreats = 0
-        elif not (push.final and world.completed[world.movables.ids == push.label].all()):
+        elif missed or not push.final:
             self._history.count(push)
         if execution.stuck:
             self._recover(world)

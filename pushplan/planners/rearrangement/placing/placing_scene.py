@@ -211,6 +211,14 @@ class PlacingScene:
         """Checks the robot, grown by what it keeps from things on its way, among everything."""
         return core.CollisionChecker(footprint(self.robot, MARGIN * self.size), self.among(-1))
 
+    @property
+    def can_set_out(self) -> bool:
+        """True if the robot keeps its distance, and can turn where it stands if it is no car."""
+        x, y, _ = self.world.robot_pose.tolist()
+        if not self.is_car and self.among(-1).touches_disc(x, y, self.size):
+            return False
+        return self.alone_wide.is_free(self.world.robot_pose)
+
     @cached_property
     def alone_body(self) -> core.Footprint:
         """The robot."""
