@@ -116,8 +116,9 @@ class Placer:
         return True
 
     def _give_up(self, world: World) -> None:
-        """Wait, and get off what the robot touches."""
+        """Wait, forget what has failed, and get off what the robot touches."""
         self._history.failures.clear()
+        self._grip = self.config.grip
         self._look_at = world.time + self._wait
         self._wait = min(2.0 * self._wait, _LONGEST_WAIT)
         if not PlacingScene(world, self._grip).can_set_out:
