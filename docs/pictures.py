@@ -4,8 +4,8 @@ Usage::
 
     python docs/pictures.py [NAME ...]
 
-Writes into docs/images: `box-delivery-layouts`, `area-clearing-layouts`, `namo-order`, `mujoco`,
-`gtsp-mpc`, `push-aware`, `ship-planners`; all of them without a name.
+Writes into docs/images: `box-delivery-layouts`, `area-clearing-layouts`, `namo-order`, `rearrange`,
+`mujoco`, `gtsp-mpc`, `push-aware`, `ship-planners`; all of them without a name.
 `mujoco` needs OpenGL (docs/simulators-mujoco.md).
 """
 
@@ -46,15 +46,15 @@ def layouts(task: str) -> None:
     save_figure(IMAGES / f"{task.replace('_', '-')}-layouts.png", figure)
 
 
-def namo_order() -> None:
-    """A box that goes through its door, and a wide one that goes aside."""
-    scenario = suite("namo-2d-order", episodes=1, first_seed=1001).scenarios[0]
+def start_and_end(name: str, first_seed: int, policy: str, file: str) -> None:
+    """Start and end of an episode of a suite."""
+    scenario = suite(name, episodes=1, first_seed=first_seed).scenarios[0]
     with make(scenario) as env:
-        episode = run_episode(env, make_policy("namo"), scenario)
+        episode = run_episode(env, make_policy(policy), scenario)
     world = episode.world_at(len(episode.times) - 1)
     trails = {"trail": episode.robot_poses, "object_trails": episode.object_poses}
     panels = (Panel(episode.world, title="start"), Panel(world, title="end", **trails))
-    save_figure(IMAGES / "namo-order.png", draw_figure(*panels, width_in=7.0))
+    save_figure(IMAGES / file, draw_figure(*panels, width_in=7.0))
 
 
 def mujoco() -> None:
@@ -155,7 +155,8 @@ def ship_plans() -> None:
 DRAWN = {
     "box-delivery-layouts": lambda: layouts("box_delivery"),
     "area-clearing-layouts": lambda: layouts("area_clearing"),
-    "namo-order": namo_order,
+    "namo-order": lambda: start_and_end("namo-2d-order", 1001, "namo", "namo-order.png"),
+    "rearrange": lambda: start_and_end("rearrange-2d-3", 1001, "gtsp-mpc", "rearrange.png"),
     "mujoco": mujoco,
     "gtsp-mpc": first_pushes,
     "push-aware": door,

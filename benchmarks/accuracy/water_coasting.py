@@ -1,4 +1,4 @@
-"""How far ship and floes coast in open water at full scale: the table in docs/tasks.md.
+"""How far ship and floes coast in open water at full scale; docs/tasks.md has some of it.
 
 python -m benchmarks.accuracy.water_coasting
 """
