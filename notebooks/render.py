@@ -49,11 +49,9 @@ DPI = 110
 HEAD = """\
 # Notebooks
 
-Seven of them, in [`notebooks/`](../notebooks). `pip install -e ".[notebooks]"` brings what
-they need. Open one with Jupyter, or read here what it says and shows. They are kept without
-outputs and run as tests. `python notebooks/render.py` makes these pages; each took 5 to 80 s on a
-2-core machine that was busy with other work (2026-11-25), which
-makes every time on them longer.
+Seven, in [`notebooks/`](../notebooks). `pip install -e ".[notebooks]"` brings what they need. Open one
+with Jupyter, or read here what it says and shows. `python notebooks/render.py` makes these pages; each
+took 5 to 80 s on a busy 2-core machine (2026-11-25), so the times in them are upper bounds.
 """
 
 
