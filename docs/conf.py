@@ -30,7 +30,7 @@ extensions = [
 exclude_patterns = ["site"]
 templates_path: list[str] = []
 
-myst_enable_extensions = ["colon_fence"]
+myst_enable_extensions = ["attrs_block", "colon_fence"]
 myst_heading_anchors = 4
 default_role = "py:obj"
 autodoc_member_order = "bysource"
