@@ -61,6 +61,7 @@ html_theme = "furo"
 html_title = f"pushplan {version}"
 html_static_path = ["site/static"]
 html_css_files = ["site.css"]
+html_search_scorer = str(HERE / "site" / "search_scores.js")
 copybutton_prompt_text = "$ "
 
 
