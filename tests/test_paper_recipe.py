@@ -54,7 +54,7 @@ def test_a_small_study_becomes_tables_and_figures(tmp_path: Path) -> None:
             (paper / file).write_text(printed, encoding="utf-8")
     assert len(Results.load(paper / "run").rows) == 2 * len(study["policies"])
     source = (paper / "paper.tex").read_text("utf-8")
-    named = re.findall(r"\\(?:includegraphics\[.*?\]|input){(.*?)}", source)
+    named = re.findall(r"\\(?:includegraphics(?:\[.*?\])?|input){(.*?)}", source)
     assert len(named) == 3 and all((paper / name).stat().st_size > 0 for name in named)
     tables = (paper / "tables.tex").read_text("utf-8")
     assert tables.count(r"\begin{table}") == 2 and "push-aware" in tables
