@@ -30,7 +30,7 @@ extensions = [
 exclude_patterns = ["site"]
 templates_path: list[str] = []
 
-myst_enable_extensions = ["colon_fence"]
+myst_enable_extensions = ["attrs_block", "colon_fence"]
 myst_heading_anchors = 4
 default_role = "py:obj"
 autodoc_member_order = "bysource"
@@ -61,6 +61,7 @@ html_theme = "furo"
 html_title = f"pushplan {version}"
 html_static_path = ["site/static"]
 html_css_files = ["site.css"]
+html_search_scorer = str(HERE / "site" / "search_scores.js")
 copybutton_prompt_text = "$ "
 
 

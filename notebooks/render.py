@@ -49,11 +49,10 @@ DPI = 110
 HEAD = """\
 # Notebooks
 
-Seven of them, in [`notebooks/`](../notebooks). `pip install -e ".[notebooks]"` brings what
-they need. Open one with Jupyter, or read here what it says and shows. They are kept without
-outputs and run as tests. `python notebooks/render.py` makes these pages; each took 5 to 80 s on a
-2-core machine that was busy with other work (2026-11-25), which
-makes every time on them longer.
+Seven, in [`notebooks/`](../notebooks). `pip install -e ".[notebooks]"` brings what they need. Open
+one with Jupyter, or read here what it says and shows; code that only draws is in the notebook
+alone. `python notebooks/render.py` makes these pages. Each took 5 to 80 s on a busy 2-core machine
+(2026-11-25), so the times in them are upper bounds.
 """
 
 
@@ -71,7 +70,7 @@ class Output:
 
 
 Cell = tuple[str, str, Output | None]
-"""Kind, source and output; only code has an output."""
+"""Kind, source and output; only code has an output. A page shows hidden code by its output."""
 
 
 def notebooks() -> list[Path]:
@@ -81,16 +80,22 @@ def notebooks() -> list[Path]:
 
 
 def cells_of(path: Path) -> list[tuple[str, str]]:
-    """Kind and source of each cell."""
+    """Kind and source of each cell; code with the tag ``hide-input`` is of the kind ``hidden``."""
     cells = json.loads(path.read_text("utf-8"))["cells"]
-    return [(cell["cell_type"], "".join(cell["source"])) for cell in cells]
+    return [
+        (
+            "hidden" if "hide-input" in cell["metadata"].get("tags", ()) else cell["cell_type"],
+            "".join(cell["source"]),
+        )
+        for cell in cells
+    ]
 
 
 def run_notebook(path: Path) -> Iterator[Cell]:
     """Run a notebook in an empty scope, cell by cell."""
     scope: dict[str, Any] = {"__name__": "__main__"}
     for kind, source in cells_of(path):
-        yield kind, source, run_cell(source, scope) if kind == "code" else None
+        yield kind, source, run_cell(source, scope) if kind != "markdown" else None
 
 
 def run_cell(source: str, scope: dict[str, Any]) -> Output:
@@ -146,7 +151,8 @@ def markdown(path: Path, cells: list[Cell]) -> str:
         old.unlink()
     blocks, count, heading = [], 0, ""
     for kind, source, output in cells:
-        blocks.append(shown(kind, source))
+        if kind != "hidden":
+            blocks.append(shown(kind, source))
         if output is None:
             heading = (re.findall(r"^#+ (.*)", source, flags=re.MULTILINE) or [heading])[-1]
             continue

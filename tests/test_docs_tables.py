@@ -108,6 +108,7 @@ def test_scenarios_of_a_suite_that_share_a_seed_are_kept_apart(
         ("<!-- table: mppi; columns: succes -->\nEND", "unknown column 'succes'"),
         ("<!-- table: mppi; colums: success -->\nEND", "colums"),
         ("<!-- table: mppi; suites: maze-4* -->\nEND", "unknown suite"),
+        ("<!-- table: mppi; policies: straight me -->\nEND", "unknown policy"),
         ("<!-- table: mppi; differences: me -->\nEND", "unknown policy"),
         ("<!-- table: mppi -->\n", "needs a '<!-- end of the table -->'"),
     ],

@@ -4,6 +4,7 @@
     python -m benchmarks.scores.tables --check                # say which differ from the episodes
     python -m benchmarks.scores.tables --take runs/mppi mppi  # store a run's episodes, then write
 
+    python -m benchmarks.scores.tables --show maze "columns: success, E, I, plan"  # whole tables
     python -m benchmarks.scores.tables --show runs/mine "columns: success, E, I"  # of any run
 
 ``benchmarks/experiments/NAME.yaml`` says what runs, for ``pushplan experiment``, and ``NAME.csv``
@@ -12,8 +13,9 @@ beside it has one line for each episode. A table of a page stands between two co
     <!-- table: NAME; columns: success, E, I, plan -->
     <!-- end of the table -->
 
-``suites: area-*`` leaves the other suites out. ``differences: POLICY`` gives paired differences of
-that policy to the others instead, for success, E and I.
+``suites: area-* maze-2d-10`` and ``policies: straight push-aware`` leave the others out.
+``differences: POLICY`` gives paired differences of that policy to the others instead, for success,
+E and I.
 """
 
 from __future__ import annotations
@@ -61,7 +63,8 @@ class Wanted:
 
     name: str  # of the experiment file
     columns: tuple[str, ...]
-    suites: str  # a pattern
+    suites: tuple[str, ...]  # patterns
+    policies: tuple[str, ...]  # patterns
     differences: str  # a policy; empty for scores
 
     @classmethod
@@ -70,12 +73,13 @@ class Wanted:
         name, *rest = (part.strip() for part in text.split(";"))
         given = dict(part.partition(":")[::2] for part in rest)
         fields = {key.strip(): value.strip() for key, value in given.items()}
-        known_keys("table", fields, ("columns", "suites", "differences"), ())
+        known_keys("table", fields, ("columns", "suites", "policies", "differences"), ())
         columns = fields.get("columns", "success, E, I").split(",")
         return cls(
             name,
             tuple(word.strip() for word in columns),
-            fields.get("suites", "*"),
+            tuple(fields.get("suites", "*").split()),
+            tuple(fields.get("policies", "*").split()),
             fields.get("differences", ""),
         )
 
@@ -86,7 +90,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--check", action="store_true", help="write nothing; 1 if a page differs")
     parser.add_argument("--take", nargs=2, metavar=("RUN", "NAME"), help="store a run's episodes")
     shown = ("RUN", "TABLE")
-    parser.add_argument("--show", nargs=2, metavar=shown, help="print a table of a run")
+    parser.add_argument("--show", nargs=2, metavar=shown, help="print a table of a run or NAME")
     parser.add_argument("--root", type=Path, default=ROOT, help="folder with docs and benchmarks")
     given = parser.parse_args(arguments)
     if given.check and given.take:
@@ -94,7 +98,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         if given.show:
             run, text = given.show
-            write(markdown(Results.load(run).rows, Wanted.parse(f"{run}; {text}")))
+            wanted = Wanted.parse(f"{run}; {text}")
+            stored = given.root / EXPERIMENTS / f"{run}.csv"
+            if stored.is_file():
+                rows = [one.row for one in _chosen(wanted, read(stored))]
+            else:
+                rows = Results.load(run).rows
+            write(markdown(rows, wanted))
             return 0
         if given.take:
             run, name = given.take
@@ -149,10 +159,7 @@ def _first_difference(old: str, new: str) -> str:
 
 def table(wanted: Wanted, episodes: Sequence[StoredEpisode]) -> str:
     """A table with the line above that says where it comes from, as Markdown."""
-    chosen = [one for one in episodes if fnmatchcase(one.row.setting, wanted.suites)]
-    if not chosen:
-        suites = dict.fromkeys(one.row.setting for one in episodes)
-        raise UnknownNameError("suite of the stored episodes", wanted.suites, tuple(suites))
+    chosen = _chosen(wanted, episodes)
     rows = [one.row for one in chosen]
     if wanted.differences:
         note = "Paired differences on the same scenarios: mean with its 95 % bootstrap interval."
@@ -162,6 +169,25 @@ def table(wanted: Wanted, episodes: Sequence[StoredEpisode]) -> str:
             note += " Times are the median over episodes of each one's median, and the longest."
     above = fill(f"{_origin(wanted, chosen)} {note}", WIDTH, break_on_hyphens=False)
     return f"\n{above}\n\n{markdown(rows, wanted)}\n"  # an empty line ends a table
+
+
+def _chosen(wanted: Wanted, episodes: Sequence[StoredEpisode]) -> list[StoredEpisode]:
+    """Episodes of the suites and policies of a table, each of which must name some."""
+    suites = dict.fromkeys(one.row.setting for one in episodes)
+    policies = dict.fromkeys(one.row.policy for one in episodes)
+    for kind, patterns, names in (
+        ("suite", wanted.suites, suites),
+        ("policy", wanted.policies, policies),
+    ):
+        for pattern in patterns:
+            if not any(fnmatchcase(name, pattern) for name in names):
+                raise UnknownNameError(f"{kind} of the stored episodes", pattern, tuple(names))
+    return [
+        one
+        for one in episodes
+        if any(fnmatchcase(one.row.setting, pattern) for pattern in wanted.suites)
+        and any(fnmatchcase(one.row.policy, pattern) for pattern in wanted.policies)
+    ]
 
 
 def markdown(rows: Sequence[ResultRow], wanted: Wanted) -> str:

@@ -16,6 +16,7 @@ from pushplan.cli import build_parser
 if TYPE_CHECKING:
     from docutils.nodes import Element
 
+_SCORES = re.compile(r"^(?=\| suite \| )", re.MULTILINE)
 _LINK_UP = re.compile(r"\[([^\]]*)\]\((\.\./[^)#]+)(?:#[^)]*)?\)")
 
 
@@ -161,7 +162,7 @@ def _options(parser: argparse.ArgumentParser) -> list[str]:
 
 
 def prepare(app: Any, name: str, source: list[str]) -> None:
-    """Show links to what has no page as text."""
+    """Show links to what has no page as text, and give tables of scores their class."""
     root = Path(app.srcdir) / Path(name).parent
 
     def shown(found: re.Match[str]) -> str:
@@ -169,6 +170,7 @@ def prepare(app: Any, name: str, source: list[str]) -> None:
 
     if not name.startswith("generated/"):
         source[0] = _LINK_UP.sub(shown, source[0])
+        source[0] = _SCORES.sub("{.scores}\n", source[0])
 
 
 def resolve(app: Any, env: Any, node: Element, contnode: Element) -> Element | None:
