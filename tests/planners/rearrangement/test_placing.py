@@ -17,7 +17,8 @@ from pushplan.planners.rearrangement import GtspMpc, RearrangementConfig
 from pushplan.planners.rearrangement.placing.contact import compose, contacts_of, inverse
 from pushplan.planners.rearrangement.placing.curves import Turning, is_clear, way_around
 from pushplan.planners.rearrangement.placing.place_order import first_push
-from pushplan.planners.rearrangement.placing.place_push import PlacePushes, PlacingHistory
+from pushplan.planners.rearrangement.placing.place_push import PlacingHistory
+from pushplan.planners.rearrangement.placing.place_pushes import PlacePushes
 from pushplan.planners.rearrangement.placing.placing_scene import PlacingScene
 from pushplan.scenarios import generate_rearrangement
 from pushplan.world import (

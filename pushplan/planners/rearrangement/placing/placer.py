@@ -9,10 +9,8 @@ import numpy as np
 from pushplan.control import ImmediateExecutor, Legs, Recovery
 from pushplan.planners.rearrangement.placing.place_execution import PlaceExecution, Transit
 from pushplan.planners.rearrangement.placing.place_order import PlaceChoice, first_push, way_to
-from pushplan.planners.rearrangement.placing.place_push import (
-    PlacePushes,
-    PlacingHistory,
-)
+from pushplan.planners.rearrangement.placing.place_push import PlacingHistory
+from pushplan.planners.rearrangement.placing.place_pushes import PlacePushes
 from pushplan.planners.rearrangement.placing.placing_scene import PlacingScene
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.world import PendingResult, PlanningExecutor, Stop, Twist, World
