@@ -106,7 +106,7 @@ def test_controllers_are_compared_under_the_same_disturbances(table, monkeypatch
     _, *lines = table("--ablation", "mpc", "--seeds", "0:2")
     assert [line[0] for line in lines] == names
     for line in lines:
-        assert line[1:] == ["2", *["1.000 / 0.000", "+1.000 (+1.000 to +1.000)"] * 2]
+        assert line[1:] == ["2", *["1.000 / 0.000", "+1.000 (+1.000 to +1.000)"] * 2, *[""] * 4]
 
 
 def test_friction_is_off_by_a_factor_and_masses_are_not_told(folder):

@@ -249,20 +249,36 @@ def relopush_table(results: Results) -> None:
 
 
 def mpc_table(runs: Mapping[str, Results]) -> None:
-    """Print success and S of both controllers under each disturbance, and their differences."""
+    """Print what both controllers do under each disturbance, and the differences."""
     names = " / ".join(runs)
-    head("disturbance", "pairs", f"success, {names}", "difference", f"S, {names}", "difference")
+    titles = ("success", "S", "pushes", "pushing [m]")
+    head(
+        "disturbance",
+        "pairs",
+        *(title for name in titles for title in (f"{name}, {names}", "difference")),
+    )
     first, second = runs.values()
     for label in first.policies:
         one, two = ({key(r): r for r in run.rows if r.policy == label} for run in (first, second))
         both = sorted(one.keys() & two.keys())
         if not both:
             continue
+        scores = [[(r.success, r.S_manip) for r in (one[k], two[k])] for k in both]
+        done = [k for k in both if one[k].success and two[k].success]
+        found = [
+            measured(run, [rows[k] for k in done]) for run, rows in ((first, one), (second, two))
+        ]
+        efforts = [
+            [(m.pushing.pushes, m.pushing.pushing_distance_m) for m in (mine[k] for mine in found)]
+            for k in done
+        ]
         cells = []
-        for name in ("success", "S_manip"):
-            pairs = np.array([(getattr(one[k], name), getattr(two[k], name)) for k in both], float)
-            cells.append(" / ".join(f"{value:.3f}" for value in pairs.mean(axis=0)))
-            cells.append(difference(pairs))
+        for pairs in (scores, efforts):
+            for column in np.array(pairs, float).reshape(-1, 2, 2).transpose(2, 0, 1):
+                cells.append(
+                    " / ".join(f"{value:.3f}" for value in column.mean(axis=0)) if pairs else ""
+                )
+                cells.append(difference(column))
         row(label, len(both), *cells)
 
 
