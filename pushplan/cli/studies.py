@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from pushplan.cli.common import duration, say
 from pushplan.cli.output_files import check_directory
 from pushplan.cli.progress import progress_of
+from pushplan.cli.scenario_options import start_of_task
 
 if TYPE_CHECKING:
     from pushplan.evaluation import Experiment
@@ -23,21 +24,25 @@ BYTES_PER_GB = 1e9
 def bench(options: argparse.Namespace) -> int:
     """Run the batch, print the table, write plots and page."""
     from pushplan.evaluation.benchmark import bench_experiment
+    from pushplan.evaluation.experiment_file import EPISODES
+    from pushplan.scenarios.suite import seeds_of
     from pushplan.world import InvalidInputError
 
     if options.policies is None:  # the parser would say so before it names a misspelt option
         raise InvalidInputError(
             "the following arguments are required: --policies; see 'pushplan bench --help'"
         )
+    suite = options.suite
+    if (start := start_of_task(options)) is not None:
+        suite = seeds_of(start, options.episodes or EPISODES)
     out = options.out
     if not out:  # folders of worlds count by their names
-        names = [
-            Path(one).resolve().name if "/" in one else one for one in options.suite.split(",")
-        ]
+        found = options.suite.split(",") if start is None else [suite.name]
+        names = [Path(one).resolve().name if "/" in one else one for one in found]
         out = os.path.join("runs", ",".join(names))
     check_directory(out)
     experiment = bench_experiment(
-        options.suite,
+        suite,
         options.policies,
         episodes=options.episodes,
         observation=options.observation,

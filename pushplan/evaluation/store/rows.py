@@ -283,7 +283,7 @@ def blank_row(policy: str, scenario: Any, status: Status, reason: str) -> Result
     }
     return ResultRow(
         policy=policy,
-        task=str(scenario.task),
+        task=str(scenario.task).rpartition(":")[2],
         simulator=str(scenario.simulator),
         scenario=str(scenario.key),
         seed=int(scenario.seed),
