@@ -85,7 +85,9 @@ def load_users(kind: str, spec: str) -> Any:
     except MemoryError:
         raise
     except (Exception, SystemExit) as error:
-        said = str(error) if isinstance(error, InvalidInputError) else describe(error)
+        said = describe(error)
+        if isinstance(error, InvalidInputError):
+            said = str(error)
         raise InvalidInputError(f"cannot load {kind} {spec!r}: {said}") from error
     if not callable(found):
         raise InvalidInputError(
