@@ -25,6 +25,9 @@ def run(options: argparse.Namespace) -> int:
     from pushplan.evaluation.report import table_formats
 
     results = Results.load(options.directory)
+    if options.json and options.metrics is None:
+        show_json(results, options.pairs)
+        return 0
     if options.metrics is None and options.format is None:
         figures = options.figures or ()
         show(results, options, replays=options.replays, most=options.replay_most, figures=figures)
@@ -33,7 +36,9 @@ def run(options: argparse.Namespace) -> int:
         tables = results.measure(options.metrics)
     else:
         tables = results.tables(settings=options.settings, pairs=options.pairs)
-    if options.format is None:
+    if options.json:
+        say_json(tables)
+    elif options.format is None:
         _print(tables)
     else:
         say(getattr(table_formats, options.format)(tables).rstrip())

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pushplan.cli.common import duration, say
+from pushplan.cli.common import duration, say, tell
 from pushplan.cli.output_files import check_directory
 from pushplan.cli.progress import progress_of
 from pushplan.cli.scenario_options import start_of_task
@@ -60,9 +60,10 @@ def experiment(options: argparse.Namespace) -> int:
 
     found = Experiment.load(options.file)
     jobs = found.jobs
+    said = sys.stderr if options.json else sys.stdout
     for (title, label), why in found.skipped.items():
-        say(f"left out: {label} in {title}: {why}")
-    if options.check:
+        said.write(f"left out: {label} in {title}: {why}\n")
+    if options.check and not options.json:
         for suite in found.suites:
             scenario = suite.scenarios[0]
             labels = [job.policy.label for job in jobs if job.scenario == scenario]
@@ -97,8 +98,7 @@ def stress(options: argparse.Namespace) -> int:
         from pushplan.files.output_files import write_atomic
 
         write_atomic(Path(options.out) / "stress.md", markdown([table]).encode())
-    say(text([table]).rstrip())
-    say(table.note)
+    tell(options, sheet, text([table]).rstrip(), table.note)
     return 1 if sheet.missed else 0
 
 
@@ -117,13 +117,15 @@ def _run(experiment: Experiment, out: str, options: argparse.Namespace) -> int:
     workers = f"{options.workers or 1} workers"
     if options.dask:
         workers = "a cluster"
-    for line in _cost_lines(experiment.cost(out, **chosen), workers, out):
-        (sys.stdout if options.check else sys.stderr).write(f"{line}\n")
+    cost = experiment.cost(out, **chosen)
+    lines = _cost_lines(cost, workers, out)
     if options.check:
+        tell(options, cost, *lines)
         return 0
+    sys.stderr.write("".join(f"{line}\n" for line in lines))
     with progress_of(out) as progress:
         results = experiment.run(out, progress=progress, dask=options.dask, **chosen)
-    if getattr(options, "json", False):
+    if options.json:
         show_json(results, options.pairs)
     else:
         show(results, options)
