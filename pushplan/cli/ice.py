@@ -22,10 +22,9 @@ def run(options: argparse.Namespace) -> int:
     lines = [f"{len(field)} floes, concentration {100.0 * field.concentration:.2f} %"]
     about: dict[str, float] = {"floes": len(field), "concentration": float(field.concentration)}
     if len(field):
-        radii = field.radii
-        least, mean, most = float(radii.min()), float(radii.mean()), float(radii.max())
-        lines.append(f"  radii {least:.3g} to {most:.3g} m, mean {mean:.3g} m")
-        about |= {"radius_min_m": least, "radius_mean_m": mean, "radius_max_m": most}
+        radii = {"min": field.radii.min(), "max": field.radii.max(), "mean": field.radii.mean()}
+        about |= {f"radius_{name}_m": float(value) for name, value in radii.items()}
+        lines.append("  radii {min:.3g} to {max:.3g} m, mean {mean:.3g} m".format(**radii))
     tell(options, about, *lines)
     if options.out:
         from pushplan.scenarios import save_ice
