@@ -8,7 +8,7 @@ import importlib
 import importlib.util
 import os
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -78,9 +78,7 @@ def load_users(kind: str, spec: str) -> Any:
     """
     try:
         if spec.endswith(".py"):
-            names = [f"{spec}:{name}" for name in objects_of_file(spec)][:MOST_CHOICES]
-            valid = ", ".join(names) or "none"
-            raise InvalidInputError(f"'file.py:Name' is needed (valid: {valid})")
+            raise InvalidInputError(names_to_give(spec))
         found = load_object(spec)
     except MemoryError:
         raise
@@ -109,14 +107,19 @@ def look_up_or_load(kind: str, table: Mapping[str, str], name: object) -> Any:
     return look_up(kind, table, name)
 
 
-def objects_of_file(path: str | Path) -> dict[str, Any]:
-    """The classes and functions that a file defines, by name, in its order.
+def names_to_give(file: str, methods: Set[str] = frozenset()) -> str:
+    """Say what to give instead of a file alone: what it defines; errors are those of `load_object`.
 
-    What it imports from elsewhere, and what begins with an underscore, is left out. Errors are
-    those of `load_object`.
+    Args:
+        file: its path.
+        methods: only classes that have one of these; if empty functions too.
     """
     with _fresh_modules():
-        return _callables_of(_load_file(Path(path)))
+        found = _callables_of(_load_file(Path(file)))
+    if methods:
+        found = {name: one for name, one in found.items() if methods & {*dir(one)}}
+    named = " or ".join([f"{file}:{name}" for name in found][:MOST_CHOICES])
+    return f"names no class or function: give {named or 'one that has some'}"
 
 
 def import_path(folder: str | None = None) -> list[str]:

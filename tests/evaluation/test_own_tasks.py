@@ -151,7 +151,7 @@ def test_a_scenario_keeps_its_file_in_another_folder(
 @pytest.mark.parametrize(
     ("task", "said"),
     [
-        ("own_task.py", "'file.py:Name' is needed (valid: own_task.py:FieldVariations, "),
+        ("own_task.py", "names no class or function: give own_task.py:FieldVariations or own_"),
         ("own_task.py:Openfield", "did you mean 'OpenField'?"),
         ("none.py:OpenField", "there is no file"),
         ("own_task.py:SQUARE", "must be a class or a function"),

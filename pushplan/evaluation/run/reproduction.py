@@ -49,7 +49,7 @@ class Reproduction:
 
     @property
     def how(self) -> str:
-        """What differs, with both values where it is a column."""
+        """Names of all that differs, with both values of a column."""
         parts = []
         for name in self.differing:
             values = ""
