@@ -123,33 +123,27 @@ def verify_run(options: argparse.Namespace) -> int:
     if found.left_out:
         lines.append(f"{found.left_out} of these cannot be run again: {found.why}")
     lines += sorted({f"changed since: {one.changed}" for one in found.checked if one.changed})
-    value = {"jobs": found.jobs, "left_out": found.left_out, "why": found.why}
-    tell(options, {**value, "checked": [_compared(one) for one in found.checked]}, *lines)
+    value = {**vars(found), "checked": [_compared(one) for one in found.checked]}
+    tell(options, value, *lines)
     return _say_differing(found.differing)
 
 
 def _say_differing(found: Iterable[Reproduction]) -> int:
-    """Write a line for each job that came out differently; the exit code."""
-    code = 0
-    for one in found:
-        if not one.same:
-            code = 1
-            row = one.stored
-            what = f"job {row.job[:12]}, {row.policy} on {row.scenario}"
-            sys.stderr.write(f"pushplan: {what} is not the same: {one.how}\n")
-    return code
+    """Write a line for each job that came out differently; 1 if there is one, else 0."""
+    lines = [
+        f"pushplan: job {one.stored.job[:12]}, {one.stored.policy} on {one.stored.scenario} is "
+        f"not the same: {one.how}\n"
+        for one in found
+        if not one.same
+    ]
+    sys.stderr.writelines(lines)
+    return 1 if lines else 0
 
 
 def _compared(one: Reproduction) -> dict[str, Any]:
     """A comparison as JSON values; rows by the columns of ``results.csv``."""
-    return {
-        "job": one.stored.job,
-        "same": one.same,
-        "differing": one.differing,
-        "changed": one.changed,
-        "stored": one.stored.by_column(),
-        "again": one.again.by_column(),
-    }
+    rows = {"stored": one.stored.by_column(), "again": one.again.by_column()}
+    return {**vars(one), **rows, "job": one.stored.job, "same": one.same}
 
 
 def salvage_run(options: argparse.Namespace) -> int:

@@ -108,12 +108,7 @@ def look_up_or_load(kind: str, table: Mapping[str, str], name: object) -> Any:
 
 
 def names_to_give(file: str, methods: Set[str] = frozenset()) -> str:
-    """Say what to give instead of a file alone: what it defines; errors are those of `load_object`.
-
-    Args:
-        file: its path.
-        methods: only classes that have one of these; if empty functions too.
-    """
+    """Say what to give instead of a file alone: what it defines, or classes with such a method."""
     with _fresh_modules():
         found = _callables_of(_load_file(Path(file)))
     if methods:

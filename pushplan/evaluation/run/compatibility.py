@@ -87,13 +87,7 @@ def incompatibility(
 
     The policy is made, and so is its environment. A policy of ours and a network also take one
     step; code of a user is not asked for any, as only a worker process can end it by force.
-
-    Args:
-        spec: the policy.
-        scenario: what it is to run.
-        settings: of the environment.
-        worlds: starts by scenario and action mode, which are kept here: to make the bodies of a
-            start takes most of the time.
+    Starts are kept in ``worlds`` by scenario and action mode: their bodies take most of the time.
 
     Raises:
         UnusablePolicyError: if the policy cannot be made at all.

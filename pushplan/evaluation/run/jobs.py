@@ -62,11 +62,8 @@ class Job:
     def title(self) -> str:
         """The scenario without its seed, in words."""
         data = self.scenario.to_dict()
-        words = [
-            os.path.basename(str(data[key]))
-            for key in ("task", "simulator", "preset")
-            if key in data
-        ]
+        parts = [str(data[key]) for key in ("task", "simulator", "preset") if key in data]
+        words = map(os.path.basename, parts)  # of a user's task without its folder
         extra = [f"{key}={value}" for key, value in data.get("variations", {}).items()]
         return " ".join([*words, *extra])
 

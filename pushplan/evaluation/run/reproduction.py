@@ -16,7 +16,7 @@ from pushplan.evaluation.run.batch import Progress, run_batch
 from pushplan.evaluation.run.job_identity import differences, job_of, job_spec
 from pushplan.evaluation.run.jobs import Job, JobSettings
 from pushplan.evaluation.store.database import StoredResult, read_results, reading
-from pushplan.evaluation.store.rows import TIMING_COLUMNS, ResultRow, columns
+from pushplan.evaluation.store.rows import TIMING_COLUMNS, ResultRow
 from pushplan.world import Episode, InvalidInputError, PushplanError, SchemaError
 from pushplan.world.checks import integer, number
 
@@ -50,13 +50,10 @@ class Reproduction:
     @property
     def how(self) -> str:
         """Names of all that differs, with both values of a column."""
-        parts = []
-        for name in self.differing:
-            values = ""
-            if hasattr(self.stored, name):
-                values = f" {getattr(self.stored, name)!r} -> {getattr(self.again, name)!r}"
-            parts.append(name + values)
-        return ", ".join(parts)
+        old = self.stored.by_column()
+        new = self.again.by_column()
+        shown = {name: f" {old[name]!r} -> {new[name]!r}" for name in old}
+        return ", ".join(name + shown.get(name, "") for name in self.differing)
 
 
 @dataclass(frozen=True)
@@ -131,20 +128,19 @@ def verify(
     with reading(path) as db:
         stored = [one for one in read_results(db) if one.current]
     known = []
-    error: PushplanError | None = None
+    why = "there is no result yet"
     for one in stored:
         try:
             known.append((one, *_job_of(path, one)))
-        except PushplanError as reason:
-            error = reason
+        except PushplanError as error:
+            why = str(error)
     if not known:
-        raise error or InvalidInputError(f"{path} holds no result yet")
+        raise InvalidInputError(f"nothing of {path} can be run again: {why}")
     count = max(1, math.ceil(fraction * len(known) - 1e-9))
     chosen = sorted(rng.choice(len(known), count, replace=False).tolist())
     checked = _run_again(path, [known[k] for k in chosen], workers=workers, progress=progress)
-    return Verification(
-        tuple(checked), len(stored), len(stored) - len(known), "" if error is None else str(error)
-    )
+    left_out = len(stored) - len(known)
+    return Verification(tuple(checked), len(stored), left_out, why if left_out else "")
 
 
 def _job_of(path: str | Path, stored: StoredResult) -> tuple[Job, JobSettings]:
@@ -179,8 +175,9 @@ def _run_again(
 
 def _differing(path: Path, stored: ResultRow, folder: Path, again: ResultRow) -> list[str]:
     aside = (*TIMING_COLUMNS, "job", "trace")
-    names = [name for name in columns() if name not in aside]
-    found = [name for name in names if getattr(again, name) != getattr(stored, name)]
+    new = again.by_column()
+    old = stored.by_column().items()
+    found = [name for name, value in old if name not in aside and value != new[name]]
     first = _episode(path, stored)
     if first is None and not stored.failed:  # the run has kept no episode
         return found
