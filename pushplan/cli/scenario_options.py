@@ -42,11 +42,13 @@ def start_of_task(options: argparse.Namespace) -> Scenario | None:
     if (options.suite is None) == (options.task is None):
         raise InvalidInputError("give either a SUITE or --task NAME, see --help")
     if options.suite is None:
-        preset = options.preset or default_preset(options.task, options.simulator)
-        return Scenario(options.task, options.simulator, preset, given, options.seed)
-    if given:
+        simulator = options.simulator or "pymunk"
+        preset = options.preset or default_preset(options.task, simulator)
+        return Scenario(options.task, simulator, preset, given, options.seed)
+    extra = [*given, *(name for name in ("simulator", "preset") if getattr(options, name))]
+    if extra:
         raise InvalidInputError(
-            f"a suite says what its scenarios are: {', '.join(sorted(given))} needs --task instead"
+            f"a suite says what its scenarios are: {', '.join(sorted(extra))} needs --task instead"
         )
     return None
 

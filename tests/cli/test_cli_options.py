@@ -44,6 +44,17 @@ def test_any_observation_of_the_task_can_be_asked_for(
     assert "valid: image, spatial, state" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("command", [["run", "--policy"], ["bench", "--policies"]])
+@pytest.mark.parametrize(
+    "more", [["--simulator", "mujoco"], ["--preset", "testbed"], ["--robot", "jackal"]]
+)
+def test_a_suite_takes_nothing_that_only_a_task_has(
+    command: list[str], more: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*command, "straight", "maze-2d-3", *more]) == 2
+    assert f"{more[0][2:]} needs --task instead" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("name", ["--policy", "--policies"])
 def test_policies_are_given_by_one_option_of_two_spellings(name: str) -> None:
     parser = build_parser()
