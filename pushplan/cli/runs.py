@@ -118,8 +118,8 @@ def verify_run(options: argparse.Namespace) -> int:
             progress=progress,
         )
     same = len(found.checked) - len(found.differing)
-    lines = [f"{same} of {len(found.checked)} jobs are the same to the byte, times aside"]
-    lines[0] += f"; {found.jobs} are stored"
+    ran = f"{same} of {len(found.checked)} jobs that ran again"
+    lines = [f"{ran} came out the same to the byte, times aside; {found.jobs} are stored"]
     if found.left_out:
         lines.append(f"{found.left_out} of these cannot be run again: {found.why}")
     lines += sorted({f"changed since: {one.changed}" for one in found.checked if one.changed})

@@ -35,12 +35,6 @@ def bench(options: argparse.Namespace) -> int:
     suite = options.suite
     if (start := start_of_task(options)) is not None:
         suite = seeds_of(start, options.episodes or EPISODES)
-    out = options.out
-    if not out:  # folders of worlds count by their names
-        found = options.suite.split(",") if start is None else [suite.name]
-        names = [Path(one).resolve().name if "/" in one else one for one in found]
-        out = os.path.join("runs", ",".join(names))
-    check_directory(out)
     experiment = bench_experiment(
         suite,
         options.policies,
@@ -51,6 +45,8 @@ def bench(options: argparse.Namespace) -> int:
         timeout_s=options.timeout,
         memory_limit_mb=options.memory,
     )
+    out = options.out or os.path.join("runs", experiment.name)
+    check_directory(out)
     return _run(experiment, out, options)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from pushplan.cli import main
 from pushplan.envs import PushEnv
-from pushplan.evaluation import Experiment, JobSettings, parse_policy, reproduce
+from pushplan.evaluation import Experiment, JobSettings, bench, parse_policy, reproduce
 from pushplan.evaluation.run.job_identity import job_spec
 from pushplan.evaluation.run.jobs import Job, job_id
 from pushplan.scenarios import Scenario, load_scenarios, save_scenarios
@@ -145,6 +145,14 @@ def test_a_scenario_keeps_its_file_in_another_folder(
     monkeypatch.chdir(folder / "other")
     assert load_scenarios(folder / "field.yaml") == (scenario,)
     assert scenario.task == f"{folder / 'own_task.py'}:OpenField"
+
+
+@pytest.mark.usefixtures("folder")
+def test_it_is_a_suite_of_its_own() -> None:
+    results = bench("own_task.py:OpenField,maze-2d-3", ["straight"], episodes=2, workers=0)
+    ran = {(row.task, row.seed) for row in results.rows}
+    assert ran == {("OpenField", 0), ("OpenField", 1), ("maze", 0), ("maze", 1)}
+    assert all(row.success for row in results.rows)
 
 
 @pytest.mark.usefixtures("folder")

@@ -173,7 +173,7 @@ class TestVerify:
         command = ["runs", "verify", str(tmp_path), "--fraction", "1", "--workers", "1"]
         assert main(command) == 1
         said = capsys.readouterr()
-        assert said.out.startswith("3 of 4 jobs are the same to the byte, times aside; 4 are")
+        assert said.out.startswith("3 of 4 jobs that ran again came out the same to the byte")
         assert f"{row.scenario} is not the same: E_nav 0.25 -> {row.E_nav!r}\n" in said.err
         assert main([*command, "--json"]) == 1
         checked = json.loads(capsys.readouterr().out)["checked"]
