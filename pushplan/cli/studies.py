@@ -122,7 +122,7 @@ def _run(experiment: Experiment, out: str, options: argparse.Namespace) -> int:
     with progress_of(out) as progress:
         results = experiment.run(out, progress=progress, dask=options.dask, **chosen)
     if options.json:
-        show_json(results, options.pairs)
+        show_json(results, options)
     else:
         show(results, options)
     return exit_code(results)
