@@ -2,7 +2,7 @@
 
 ``python examples/train_ppo.py`` trains for two minutes of processor time, too short to be good;
 ``python examples/train_ppo.py runs/ppo 200000`` takes what `maze-ppo` took. It needs
-``pip install -e ".[learn]"``. Afterwards the file is a policy like any other:
+``pip install -e ".[train]"``. Afterwards the file is a policy like any other:
 
 ``pushplan bench maze-2d-3 --policies straight,sb3:runs/ppo/model.zip --trust-pickles``
 """

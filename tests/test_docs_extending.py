@@ -1,8 +1,4 @@
-"""The code blocks of docs/extending.md, run from top to bottom in a folder of their own.
-
-Commands run as a shell runs them: in a process that knows nothing of the blocks before, and
-without the folder on the import path.
-"""
+"""The code blocks of docs/extending.md, each in a process of its own, beside the page's files."""
 
 from __future__ import annotations
 
@@ -17,8 +13,6 @@ from pathlib import Path
 import pytest
 
 from pushplan import geometry
-from pushplan.envs import registry
-from pushplan.metrics import METRICS
 from pushplan.world import Movables, RobotModel, StaticMap, World
 
 PAGE = Path(__file__).parents[1] / "docs" / "extending.md"
@@ -44,52 +38,44 @@ def test_the_tables_of_a_world_name_what_is_there() -> None:
         assert name in geometry.__all__
 
 
-def run(line: str) -> str:
-    """What a command prints; it must end well."""
-    program, *arguments = shlex.split(line)
-    start = {"pushplan": ["-P", "-m", "pushplan"], "python": []}[program]
+def run(kind: str, text: str) -> str:
+    """Return the output of a block in a process of its own; it must end well."""
+    program = [sys.executable, "-c", text]
+    if kind == "bash":
+        arguments = shlex.split(text)
+        assert arguments.pop(0) == "pushplan"
+        program = [sys.executable, "-P", "-m", "pushplan", *arguments]
     done = subprocess.run(
-        [sys.executable, *start, *arguments],
+        program,
         env={name: value for name, value in os.environ.items() if name != "PYTHONSAFEPATH"},
         capture_output=True,
         text=True,
         check=False,
     )
-    assert done.returncode == 0, f"{line}: {done.stderr}"
+    assert done.returncode == 0, f"{text}: {done.stderr}"
     return done.stdout
 
 
 @pytest.mark.release
-def test_the_code_blocks_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_each_code_block_runs_on_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setattr("os.cpu_count", lambda: 1)
-    tables = [(table, dict(table)) for table in (METRICS, registry.TASKS)]
-    modules = set(sys.modules)
-    names: dict[str, object] = {}
-    said: list[str] = []
-    try:
-        for language, text in BLOCK.findall(PAGE.read_text(encoding="utf-8")):
-            first, _, rest = text.partition("\n")
-            if language == "bash":
-                said += map(run, text.splitlines())
-            elif language == "toml":
-                assert tomllib.loads(text)
-            elif first.startswith("# ") and first.endswith(".py"):
-                Path(first[2:]).write_text(rest, encoding="utf-8")
-            else:
-                exec(compile(text, str(PAGE), "exec"), names)
-    finally:
-        for table, before in tables:
-            table.clear()
-            table.update(before)
-        for name in set(sys.modules) - modules:
-            if name.startswith("my_"):
-                del sys.modules[name]
-    assert (tmp_path / "field.yaml").is_file()
-    runs = [text for text in said if re.match(r"\w+ on ", text)]
-    assert [text.split()[0] for text in runs] == ["Pursuer", "Circler", "straight"]
-    ends = [re.match(r".*: (\w+)", text)[1] for text in runs]
-    assert ends == ["success", "no_progress", "success"]
+    blocks = []
+    for kind, text in BLOCK.findall(PAGE.read_text(encoding="utf-8")):
+        first, _, rest = text.partition("\n")
+        if kind == "toml":
+            assert tomllib.loads(text)
+        elif first.startswith("# ") and first.endswith(".py"):
+            Path(first[2:]).write_text(rest, encoding="utf-8")
+        else:
+            blocks += [(kind, one) for one in (text.splitlines() if kind == "bash" else [text])]
+    said = [run(kind, text) for kind, text in blocks]
+    ends = [re.match(r"([\w-]+) on .*: (\w+)", text) for text in said]
+    assert [end.groups() for end in ends if end] == [
+        ("Pursuer", "success"),
+        ("Circler", "no_progress"),
+        ("straight", "success"),
+        ("push-aware", "success"),
+    ]
     rows = (tmp_path / "runs" / "mine" / "results.csv").read_text().splitlines()
     assert len(rows) == 3 and all(",done,goal," in row for row in rows[1:])
+    assert len((tmp_path / "runs" / "field" / "results.csv").read_text().splitlines()) == 5

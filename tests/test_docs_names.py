@@ -53,7 +53,7 @@ def names_in(text: str) -> Iterator[str]:
 
 def leads_somewhere(name: str) -> bool:
     """Whether a name is a module, or an attribute of one, of a class, or of its instances."""
-    if name == "pushplan.policies":  # a group of entry points
+    if name in ("pushplan.policies", "pushplan.robots", "pushplan.tasks"):  # of entry points
         return True
     parts = name.split(".")
     found: object = importlib.import_module(parts[0])

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
 
 import pytest
+
+from pushplan.imports.on_demand import EXTRAS as ON_DEMAND
+
+ROOT = Path(__file__).parents[1]
 
 WITHOUT = """
 import sys
@@ -91,7 +98,7 @@ def test_a_robot_needs_none_of_the_extras():
         ("onnxruntime", ["run", "maze-2d-3", "--policy", "maze-ppo"], "learned"),
         ("mcap", ["score", "robot.mcap"], "ros"),
         ("rosbags", ["run", "maze-2d-3", "--policy", "straight", "--out", "a.mcap"], "ros"),
-        ("torch", ["train", "ppo", "--task", "maze", "--out", "never-made"], "learn"),
+        ("torch", ["train", "ppo", "--task", "maze", "--out", "never-made"], "train"),
     ],
 )
 @pytest.mark.slow
@@ -102,6 +109,31 @@ def test_a_missing_library_is_one_line_that_names_the_extra(absent, arguments, e
     assert done.stderr.strip().count("\n") == 0, done.stderr
     assert f"pip install 'pushplan[{extra}]'" in done.stderr
     assert absent in done.stderr
+
+
+def test_all_brings_what_a_user_of_the_package_may_need():
+    """Left out is what trains networks, and what develops and documents the package."""
+    page = (ROOT / "docs" / "installation.md").read_text("utf-8")
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"][
+        "optional-dependencies"
+    ]
+    (brought,) = re.findall(r"pushplan\[(.*)\]", *extras["all"])
+    others = {"all", "dev", "docs", "learn", "notebooks", "test", "train"}
+    assert {*brought.split(","), "pictures"} == extras.keys() - others  # `sim` brings pictures
+    above = page.partition('".[all]"')[0]
+    assert set(re.findall(r'^\| `pip install -e "\.\[(\w+)\]"`', above, re.MULTILINE)) == (
+        extras.keys() - others
+    )
+
+
+def test_each_library_is_brought_by_the_extra_that_errors_name():
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"][
+        "optional-dependencies"
+    ]
+    packages = {"PIL": "pillow", "h5py": "minari[hdf5]"}
+    for library, extra in ON_DEMAND.items():
+        package = packages.get(library, library).replace("_", "-")
+        assert any(one.startswith(package) for one in extras[extra]), library
 
 
 def test_another_missing_module_is_no_matter_of_extras():

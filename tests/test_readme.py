@@ -67,7 +67,7 @@ def test_the_commands_are_where_ci_looks_for_them() -> None:
     first, second = [text for kind, text in BLOCKS if kind == "bash"][:2]
     assert first.startswith('pip install -e ".[sim,plots]" && pushplan bench ')
     assert second.startswith('pip install -e ".[test]" && pytest')
-    assert len(BENCHES) == 2 and len(PYTHON) == 3
+    assert len(BENCHES) == 2 and len(PYTHON) == 4
 
 
 @pytest.mark.parametrize(
@@ -107,6 +107,12 @@ def test_a_room_is_planned_in(folder, monkeypatch, capsys) -> None:
     monkeypatch.chdir(folder)
     exec(block("load_world"), {"__name__": "__main__"})
     assert capsys.readouterr().out.startswith("solved")
+
+
+def test_an_environment_takes_a_step() -> None:
+    found: dict[str, object] = {}
+    exec(block("import gymnasium"), found)
+    assert found["terminated"] is False and found["reward"] != 0.0
 
 
 @pytest.mark.usefixtures("cpu_time")

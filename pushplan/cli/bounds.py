@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import asdict
 
-from pushplan.cli.common import say, say_json
+from pushplan.cli.common import tell
 from pushplan.cli.output_files import check_file
 
 
@@ -35,14 +34,13 @@ def run(options: argparse.Namespace) -> int:
                 proven = proven.better(known.best, known.best_policy)
             found[scenario.key] = proven
     found = with_solutions(found, runs)
-    if options.json:
-        say_json([{"scenario": one.key, **asdict(found[one.key])} for one in scenarios])
-    else:
-        for key in (one.key for one in scenarios):
-            best = ""
-            if (work := found[key].best) is not None:
-                best = f", best known {work:.4g} kg m ({found[key].best_policy})"
-            say(f"{key}: bound {found[key].bound:.4g} kg m{best}")
+    lines = []
+    for key in (one.key for one in scenarios):
+        best = ""
+        if (work := found[key].best) is not None:
+            best = f", best known {work:.4g} kg m ({found[key].best_policy})"
+        lines.append(f"{key}: bound {found[key].bound:.4g} kg m{best}")
+    tell(options, [{"scenario": one.key, **vars(found[one.key])} for one in scenarios], *lines)
     if options.out is not None:
         save_bounds(options.out, found)
     return 0

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import math
 import os
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import fields, is_dataclass
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -64,12 +66,29 @@ def say(text: str, end: str = "\n") -> None:
     sys.stdout.write(text + end)
 
 
+def tell(options: argparse.Namespace, value: Any, *lines: str) -> None:
+    """Write a result to standard output: with ``--json`` as JSON alone, else in these lines."""
+    if options.json:
+        say_json(value)
+    elif lines:
+        say("\n".join(lines))
+
+
+def say_written(options: argparse.Namespace, *files: str | None) -> None:
+    """Say which files were written, those that are not None, unless ``--json`` is given."""
+    for file in files:
+        if file is not None and not options.json:
+            say(f"wrote {file}")
+
+
 def say_json(value: Any) -> None:
     """Write a value to standard output as JSON; what is not finite becomes null."""
     say(json.dumps(_finite(value), indent=1))
 
 
 def _finite(value: Any) -> Any:
+    if is_dataclass(value) and not isinstance(value, type):
+        return _finite({one.name: getattr(value, one.name) for one in fields(value)})
     if isinstance(value, Mapping):
         return {key: _finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from pushplan.cli.common import milliseconds, say
+from pushplan.cli.common import milliseconds, say_written, tell
 from pushplan.cli.output_files import check_file
 from pushplan.errors import InvalidInputError
 
@@ -34,18 +34,24 @@ def run(options: argparse.Namespace) -> int:
         initial=read_tour(options.initial) if options.initial else None,
         fixed_start=[node - 1 for node in options.fixed_start],
     )
-    say(f"{instance.name}: {len(instance.costs)} nodes in {len(instance.clusters)} clusters")
     stats = tour.stats
+    nodes = [int(node) + 1 for node in tour.nodes]
+    about = {"name": instance.name, "status": tour.status.label, "cost": tour.cost}
+    about |= {"lower_bound": tour.lower_bound, "nodes": nodes, "stats": stats}
+    lines = [f"{instance.name}: {len(instance.costs)} nodes in {len(instance.clusters)} clusters"]
     if not tour.status.has_tour:
-        say(f"  {tour.status.label}: {tour.status.remedy}")
+        tell(options, about, *lines, f"  {tour.status.label}: {tour.status.remedy}")
         return 1
-    say(f"  {tour.status.label}, cost {tour.cost:.10g}, lower bound {tour.lower_bound:.10g}")
-    say(
+    tell(
+        options,
+        about,
+        *lines,
+        f"  {tour.status.label}, cost {tour.cost:.10g}, lower bound {tour.lower_bound:.10g}",
         f"  {stats.method}, {stats.iterations} rounds, {milliseconds(stats.wall_time_s)}, "
-        f"found after {milliseconds(stats.best_s)}"
+        f"found after {milliseconds(stats.best_s)}",
+        "  nodes " + " ".join(map(str, nodes)),
     )
-    say("  nodes " + " ".join(str(node + 1) for node in tour.nodes))
     if options.out:
         write_tour(options.out, tour.nodes, name=f"{instance.name} {tour.cost:.10g}")
-        say(f"wrote {options.out}")
+    say_written(options, options.out)
     return 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from pushplan.cli.common import say
+from pushplan.cli.common import say_written, tell
 from pushplan.cli.output_files import check_file, check_picture
 
 if TYPE_CHECKING:
@@ -19,18 +19,20 @@ def run(options: argparse.Namespace) -> int:
     check_file(options.out, (".json", ".npz"))
     check_picture(options.picture)
     field = _field(options)
-    say(f"{len(field)} floes, concentration {100.0 * field.concentration:.2f} %")
+    lines = [f"{len(field)} floes, concentration {100.0 * field.concentration:.2f} %"]
+    about: dict[str, float] = {"floes": len(field), "concentration": float(field.concentration)}
     if len(field):
-        radii = field.radii
-        say(f"  radii {radii.min():.3g} to {radii.max():.3g} m, mean {radii.mean():.3g} m")
+        radii = {"min": field.radii.min(), "max": field.radii.max(), "mean": field.radii.mean()}
+        about |= {f"radius_{name}_m": float(value) for name, value in radii.items()}
+        lines.append("  radii {min:.3g} to {max:.3g} m, mean {mean:.3g} m".format(**radii))
+    tell(options, about, *lines)
     if options.out:
         from pushplan.scenarios import save_ice
 
         save_ice(field, options.out)
-        say(f"wrote {options.out}")
     if options.picture:
         _draw(field, options.picture)
-        say(f"wrote {options.picture}")
+    say_written(options, options.out, options.picture)
     return 0
 
 

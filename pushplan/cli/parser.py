@@ -139,13 +139,12 @@ def _add_commands(
             continue
         command.set_defaults(run=about["run"])
         for option in about["options"]:
+            group: argparse._ActionsContainer = command
             if "one_of" in option:
                 group = command.add_mutually_exclusive_group()
-                for one in option["one_of"]:
-                    _add_option(group, **one)
-            else:
-                for one in shared[option["shared"]] if "shared" in option else [option]:
-                    _add_option(command, **one)
+            for one in option.get("one_of", [option]):
+                for each in shared[one["shared"]] if "shared" in one else [one]:
+                    _add_option(group, **each)
 
 
 def named(name: str) -> Any:

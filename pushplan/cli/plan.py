@@ -8,7 +8,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pushplan.cli.common import milliseconds, say, say_json
+from pushplan.cli.common import milliseconds, say, say_json, say_written
 from pushplan.cli.output_files import check_figure, check_file
 
 if TYPE_CHECKING:
@@ -61,9 +61,7 @@ def run(options: argparse.Namespace) -> int:
         title = f"{spec.label}: {result.status.label}"
         figure = draw_figure(Panel(world, plan=result.plan))
         save_figure(options.render, figure, title=title)
-    for file in (options.out, options.render):
-        if file and not options.json:
-            say(f"wrote {file}")
+    say_written(options, options.out, options.render)
     return 0 if result.plan is not None else 1
 
 

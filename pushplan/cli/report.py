@@ -26,14 +26,17 @@ def run(options: argparse.Namespace) -> int:
 
     results = Results.load(options.directory)
     if options.metrics is None and options.format is None:
-        figures = options.figures or ()
-        show(results, options, replays=options.replays, most=options.replay_most, figures=figures)
+        written = {"replays": options.replays, "most": options.replay_most}
+        tell_results = show_json if options.json else show
+        tell_results(results, options, figures=options.figures or (), **written)
         return 0
     if options.metrics:
         tables = results.measure(options.metrics)
     else:
         tables = results.tables(settings=options.settings, pairs=options.pairs)
-    if options.format is None:
+    if options.json:
+        say_json(tables)
+    elif options.format is None:
         _print(tables)
     else:
         say(getattr(table_formats, options.format)(tables).rstrip())
@@ -60,9 +63,10 @@ def show(results: Results, options: argparse.Namespace, **written: Any) -> None:
     say(f"page:    {page}")
 
 
-def show_json(results: Results, pairs: str) -> None:
-    """Write the report of a run, and print what its tables say as JSON."""
-    page = results.report(pairs=pairs)
+def show_json(results: Results, options: argparse.Namespace, **written: Any) -> None:
+    """Write the report of a run, and print what its tables say as JSON; arguments as for `show`."""
+    pairs = options.pairs
+    page = results.report(pairs=pairs, **written)
     runs = [results]
     if len(results.titles) > 1:
         runs = [results.pooled, results]

@@ -12,6 +12,8 @@ from pushplan.cli.common import (
     milliseconds,
     save_episode,
     say,
+    say_json,
+    say_written,
 )
 from pushplan.cli.scenario_options import scenario_of
 
@@ -26,6 +28,7 @@ def run(options: argparse.Namespace) -> int:
     from pushplan.cli.film import Camera
     from pushplan.evaluation import Job, JobSettings, PolicyError, parse_policy, run_episode
     from pushplan.evaluation.run.execute import dry_run
+    from pushplan.evaluation.store.rows import Status, blank_row, scored_row
 
     scenario = scenario_of(options)
     check_episode_file(options.out)
@@ -44,13 +47,17 @@ def run(options: argparse.Namespace) -> int:
         raise PolicyError(f"policy {spec.label!r} failed: {error}") from error
     finally:
         env.close()
-    _print(spec.label, scenario, episode)
+    if options.json:
+        row = blank_row(spec.label, scenario, Status.DONE, episode.reason)
+        calls = len(episode.plan_times_s) or None
+        say_json(scored_row(row, episode, calls).by_column())
+    else:
+        _print(spec.label, scenario, episode)
     if options.out:
         save_episode(episode, options.out)
-        say(f"wrote {options.out}")
     if camera is not None:
         camera.write(episode)
-        say(f"wrote {options.render}")
+    say_written(options, options.out, options.render)
     return 0
 
 

@@ -12,33 +12,45 @@ if TYPE_CHECKING:
 
 
 def scenario_of(options: argparse.Namespace) -> Scenario:
-    """The scenario that was asked for.
-
-    Raises:
-        InvalidInputError: if options contradict each other.
-    """
-    from pushplan.envs.registry import default_preset
-    from pushplan.scenarios import Scenario, suite, suite_names
+    """The scenario that was asked for, by a suite or a task; errors as `start_of_task`."""
+    from pushplan.scenarios import suite, suite_names
     from pushplan.world import InvalidInputError
 
-    shown = {"boxes": options.boxes, "shape": options.shape}
-    chosen = {key: value for key, value in shown.items() if value is not None}
-    given = chosen | variations("variation", options.variations, chosen)
-    if (options.suite is None) == (options.task is None):
-        raise InvalidInputError("give either a SUITE or --task NAME, see --help")
-    if options.suite is None:
-        preset = options.preset or default_preset(options.task, options.simulator)
-        return Scenario(options.task, options.simulator, preset, given, options.seed)
-    if given:
-        raise InvalidInputError(
-            f"a suite says what its scenarios are: {', '.join(sorted(given))} needs --task instead"
-        )
+    if (found := start_of_task(options)) is not None:
+        return found
     if options.suite not in suite_names() and os.path.exists(options.suite):
         raise InvalidInputError(
             f"{options.suite!r} is a file or a folder, no suite: a world is given as "
             "--task room --set world_file=FILE"
         )
     return suite(options.suite, episodes=1, first_seed=options.seed).scenarios[0]
+
+
+def start_of_task(options: argparse.Namespace) -> Scenario | None:
+    """The scenario of ``--task`` with its variations; None where a suite is given instead.
+
+    Raises:
+        InvalidInputError: if both are given or none, or variations with a suite.
+    """
+    from pushplan.envs.registry import default_preset
+    from pushplan.scenarios import Scenario
+    from pushplan.world import InvalidInputError
+
+    shown = {name: getattr(options, name) for name in ("boxes", "shape", "robot")}
+    chosen = {key: value for key, value in shown.items() if value is not None}
+    given = chosen | variations("variation", options.variations, chosen)
+    if (options.suite is None) == (options.task is None):
+        raise InvalidInputError("give either a SUITE or --task NAME, see --help")
+    if options.suite is None:
+        simulator = options.simulator or "pymunk"
+        preset = options.preset or default_preset(options.task, simulator)
+        return Scenario(options.task, simulator, preset, given, options.seed)
+    extra = [*given, *(name for name in ("simulator", "preset") if getattr(options, name))]
+    if extra:
+        raise InvalidInputError(
+            f"a suite says what its scenarios are: {', '.join(sorted(extra))} needs --task instead"
+        )
+    return None
 
 
 def variations(kind: str, texts: Sequence[str], chosen: Collection[str] = ()) -> dict[str, Any]:

@@ -8,9 +8,9 @@ from pushplan.cli.common import (
     check_episode_file,
     load_episode,
     save_episode,
-    say,
     say_json,
     say_scores,
+    say_written,
 )
 
 
@@ -38,8 +38,7 @@ def run(options: argparse.Namespace) -> int:
             say_scores(episode, options.metrics, f"{path}: ")
         if options.out:
             save_episode(episode, options.out)
-            if not options.json:
-                say(f"wrote {options.out}")
+            say_written(options, options.out)
     if options.json:
         say_json(scored)
     return 0

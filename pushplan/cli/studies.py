@@ -8,9 +8,10 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pushplan.cli.common import duration, say
+from pushplan.cli.common import duration, say, tell
 from pushplan.cli.output_files import check_directory
 from pushplan.cli.progress import progress_of
+from pushplan.cli.scenario_options import start_of_task
 
 if TYPE_CHECKING:
     from pushplan.evaluation import Experiment
@@ -23,21 +24,19 @@ BYTES_PER_GB = 1e9
 def bench(options: argparse.Namespace) -> int:
     """Run the batch, print the table, write plots and page."""
     from pushplan.evaluation.benchmark import bench_experiment
+    from pushplan.evaluation.experiment_file import EPISODES
+    from pushplan.scenarios.suite import seeds_of
     from pushplan.world import InvalidInputError
 
     if options.policies is None:  # the parser would say so before it names a misspelt option
         raise InvalidInputError(
             "the following arguments are required: --policies; see 'pushplan bench --help'"
         )
-    out = options.out
-    if not out:  # folders of worlds count by their names
-        names = [
-            Path(one).resolve().name if "/" in one else one for one in options.suite.split(",")
-        ]
-        out = os.path.join("runs", ",".join(names))
-    check_directory(out)
+    suite = options.suite
+    if (start := start_of_task(options)) is not None:
+        suite = seeds_of(start, options.episodes or EPISODES)
     experiment = bench_experiment(
-        options.suite,
+        suite,
         options.policies,
         episodes=options.episodes,
         observation=options.observation,
@@ -46,6 +45,8 @@ def bench(options: argparse.Namespace) -> int:
         timeout_s=options.timeout,
         memory_limit_mb=options.memory,
     )
+    out = options.out or os.path.join("runs", experiment.name)
+    check_directory(out)
     return _run(experiment, out, options)
 
 
@@ -55,9 +56,10 @@ def experiment(options: argparse.Namespace) -> int:
 
     found = Experiment.load(options.file)
     jobs = found.jobs
+    said = sys.stderr if options.json else sys.stdout
     for (title, label), why in found.skipped.items():
-        say(f"left out: {label} in {title}: {why}")
-    if options.check:
+        said.write(f"left out: {label} in {title}: {why}\n")
+    if options.check and not options.json:
         for suite in found.suites:
             scenario = suite.scenarios[0]
             labels = [job.policy.label for job in jobs if job.scenario == scenario]
@@ -92,8 +94,7 @@ def stress(options: argparse.Namespace) -> int:
         from pushplan.files.output_files import write_atomic
 
         write_atomic(Path(options.out) / "stress.md", markdown([table]).encode())
-    say(text([table]).rstrip())
-    say(table.note)
+    tell(options, sheet, text([table]).rstrip(), table.note)
     return 1 if sheet.missed else 0
 
 
@@ -112,14 +113,16 @@ def _run(experiment: Experiment, out: str, options: argparse.Namespace) -> int:
     workers = f"{options.workers or 1} workers"
     if options.dask:
         workers = "a cluster"
-    for line in _cost_lines(experiment.cost(out, **chosen), workers, out):
-        (sys.stdout if options.check else sys.stderr).write(f"{line}\n")
+    cost = experiment.cost(out, **chosen)
+    lines = _cost_lines(cost, workers, out)
     if options.check:
+        tell(options, cost, *lines)
         return 0
+    sys.stderr.write("".join(f"{line}\n" for line in lines))
     with progress_of(out) as progress:
         results = experiment.run(out, progress=progress, dask=options.dask, **chosen)
-    if getattr(options, "json", False):
-        show_json(results, options.pairs)
+    if options.json:
+        show_json(results, options)
     else:
         show(results, options)
     return exit_code(results)

@@ -42,11 +42,10 @@ def run(options: argparse.Namespace) -> int:
 
 def _environment(scenario: Scenario, action: str | None) -> Any:
     from pushplan.envs import make
-    from pushplan.envs.registry import TASKS
-    from pushplan.imports.on_demand import look_up
+    from pushplan.envs.registry import task_class
     from pushplan.world import InvalidInputError
 
-    known = look_up("task", TASKS, scenario.task).actions
+    known = task_class(scenario.task).actions
     usable = [name for name in known if name in ACTIONS]
     if not usable:
         raise InvalidInputError(

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pushplan.control import clamp_twist
 from pushplan.envs.action_modes import ActionMode, Motion, chosen_action, waiting
-from pushplan.envs.registry import ACTIONS, SIMULATORS, TASKS, default_preset
+from pushplan.envs.registry import ACTIONS, SIMULATORS, default_preset, task_class
 from pushplan.envs.rendering import Renderer
 from pushplan.envs.simulators.base import Simulator
 from pushplan.envs.tasks.base import StepOutcome, Task
@@ -86,33 +86,33 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         render_mode: str | None = None,
         seed: int | None = None,
     ) -> None:
-        task_class: type[Task] = look_up("task", TASKS, task)
+        kind = task_class(task)
         if isinstance(simulator, Simulator):
             self._simulator = simulator
             simulator = simulator.name
         else:
             self._simulator = look_up("simulator", SIMULATORS, simulator)()
         self._may_adapt = action is None
-        action = chosen_action(task_class, action)
+        action = chosen_action(kind, action)
         if preset is None:
             preset = default_preset(task, simulator)
-        if preset not in task_class.presets:
-            raise UnknownNameError(f"preset of {task}", preset, task_class.presets)
+        if preset not in kind.presets:
+            raise UnknownNameError(f"preset of {task}", preset, kind.presets)
         self._renderer = Renderer(render_mode, self._simulator)
         self.metadata = self._renderer.metadata
         self.render_mode = render_mode
         variations = {} if variations is None else variations
-        self._make_task = partial(task_class, preset=preset, variations=variations)
+        self._make_task = partial(kind, preset=preset, variations=variations)
         self._use_action(action)
         if self._simulator.needs_solids and self.task.materials.solids is None:
             raise ScenarioError(
                 f"{task}: simulator {simulator!r} needs a third dimension, which preset "
-                f"{preset!r} has not (valid: {', '.join(task_class.solid_presets)})"
+                f"{preset!r} has not (valid: {', '.join(kind.solid_presets)})"
             )
         if observation is None or isinstance(observation, str):
-            observation = self.task.observation(observation or task_class.observations[0])
+            observation = self.task.observation(observation or kind.observations[0])
         if not hasattr(observation, "observe"):
-            raise UnknownNameError(f"observation of {task}", observation, task_class.observations)
+            raise UnknownNameError(f"observation of {task}", observation, kind.observations)
         self._builder: ObservationBuilder = observation
         if seed is not None:
             seed = integer("seed", seed, low=0)

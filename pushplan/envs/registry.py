@@ -3,8 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
+from pushplan.errors import InvalidInputError, ScenarioError
+from pushplan.imports.named_objects import look_up_or_load
 from pushplan.imports.on_demand import Registered, look_up
+
+if TYPE_CHECKING:
+    from pushplan.envs.tasks.base import Task
 
 TASKS = Registered(
     "pushplan.tasks",
@@ -40,12 +46,26 @@ GYM_IDS: Mapping[str, str] = {
 """Gymnasium id -> task."""
 
 
+def task_class(task: str) -> type[Task]:
+    """The class of a task: by name, or one of a user's as ``"file.py:Class"``, ``"module:Class"``.
+
+    Raises:
+        UnknownNameError: if there is no such task.
+        InvalidInputError: if what the text names cannot be loaded or is no `Task`.
+    """
+    from pushplan.envs.tasks.base import Task
+
+    found = look_up_or_load("task", TASKS, task)
+    if not (isinstance(found, type) and issubclass(found, Task)):
+        raise InvalidInputError(f"task {task!r} must be a class below pushplan.envs.tasks.Task")
+    return found
+
+
 def goal_kind(task: str, variations: Mapping[str, object] | None = None) -> str | None:
     """Who has the goal in a task, ``"robot"`` or ``"objects"``; None for an unknown task."""
-    if task not in TASKS:
+    if task not in TASKS and ":" not in task:
         return None
-    kind: str = look_up("task", TASKS, task).goal_kind_of(variations or {})
-    return kind
+    return task_class(task).goal_kind_of(variations or {})
 
 
 def default_preset(task: str, simulator: str) -> str:
@@ -53,8 +73,14 @@ def default_preset(task: str, simulator: str) -> str:
 
     Raises:
         UnknownNameError: if there is no such task or simulator.
+        ScenarioError: if the task has no third dimension, which the simulator needs.
     """
-    kind = look_up("task", TASKS, task)
+    kind = task_class(task)
     engine = look_up("simulator", SIMULATORS, simulator)
-    presets: tuple[str, ...] = kind.solid_presets if engine.needs_solids else kind.presets
+    presets = kind.solid_presets if engine.needs_solids else kind.presets
+    if not presets:
+        raise ScenarioError(
+            f"{kind.name}: simulator {simulator!r} needs a preset with a third dimension, of which "
+            "the task has none (valid: pymunk)"
+        )
     return presets[0]

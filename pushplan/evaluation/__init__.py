@@ -25,7 +25,7 @@ if TYPE_CHECKING:
         parse_policy,
     )
     from pushplan.evaluation.run.recording import run_episode
-    from pushplan.evaluation.run.reproduction import Reproduction, reproduce
+    from pushplan.evaluation.run.reproduction import Reproduction, Verification, reproduce, verify
     from pushplan.evaluation.statistics.estimates import (
         Estimate,
         Proportion,
@@ -69,6 +69,7 @@ __all__ = [
     "Status",
     "UnusablePolicyError",
     "Verdict",
+    "Verification",
     "bench",
     "bootstrap_interval",
     "columns",
@@ -84,6 +85,7 @@ __all__ = [
     "run_status",
     "salvage",
     "stress",
+    "verify",
     "wilson",
 ]
 
@@ -102,7 +104,7 @@ __getattr__, __dir__ = lazy_names(
         "run.policy_specs": (
             "PolicySpec UnusablePolicyError parse_planner parse_policies parse_policy"
         ),
-        "run.reproduction": "Reproduction reproduce",
+        "run.reproduction": "Reproduction Verification reproduce verify",
         "store.rescoring": "Rescored rescore",
         "report.results": "Results",
         "store.rows": "TIMING_COLUMNS ResultRow Status columns",

@@ -6,7 +6,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pushplan.envs.registry import default_preset
 from pushplan.evaluation.experiment import Experiment
+from pushplan.evaluation.experiment_file import EPISODES
 from pushplan.evaluation.report.results import Results
 from pushplan.evaluation.run.batch import Progress
 from pushplan.evaluation.run.job_limits import MEMORY_MB
@@ -47,9 +49,10 @@ def bench(
         2
 
     Args:
-        suite: name of a suite or a folder of worlds with a slash in it, or several with commas
-            between them; a `pushplan.scenarios.Suite`; or a list of scenarios. A suite of your
-            own is one setting of the results.
+        suite: name of a suite, a folder of worlds with a slash in it, or a task of yours as
+            ``"file.py:Class"``, or several of these with commas between them; a
+            `pushplan.scenarios.Suite`; or a list of scenarios. A suite of your own is one setting
+            of the results.
         policies: names, ``"module:Class"``, ``"file.py:Class"``, each with ``label=`` in front
             if wanted, or callables that make a policy.
         episodes: scenarios of a suite by name, or of each file of a folder; the suite's own
@@ -122,13 +125,14 @@ def bench_experiment(
 
 
 def suites_of(given: Any, episodes: int | None, seed: int) -> tuple[Suite, ...]:
-    """Suites and folders of worlds, with commas between them, a suite, or a list of scenarios.
+    """Suites, folders of worlds and tasks of users, with commas, a suite, or a list of scenarios.
 
     Raises:
         UnknownNameError: if there is no suite of a name.
         InvalidInputError: if there is no such folder, or a file is given.
     """
-    from pushplan.scenarios import Suite, suite, suite_names, world_suite
+    from pushplan.scenarios import Scenario, Suite, suite, suite_names, world_suite
+    from pushplan.scenarios.suite import seeds_of
 
     if isinstance(given, Suite):
         return (given,)
@@ -144,7 +148,10 @@ def suites_of(given: Any, episodes: int | None, seed: int) -> tuple[Suite, ...]:
             )
     found = []
     for name in names:
-        if "/" in name:
+        if ":" in name:
+            start = Scenario(name, preset=default_preset(name, "pymunk"), seed=seed)
+            found.append(seeds_of(start, episodes or EPISODES))
+        elif "/" in name:
             found.append(world_suite(name, episodes=episodes or 1, first_seed=seed))
         else:
             found.append(suite(name, episodes=episodes, first_seed=seed))

@@ -169,8 +169,11 @@ class Experiment:
         of all stored episodes.
         """
         out = Path(out)
-        jobs = identified(self._part(shard), self.settings)
-        rows = open_results(out)[0] if (out / DATABASE).is_file() else []
+        jobs = self._part(shard)
+        rows = []
+        if (out / DATABASE).is_file():
+            rows = open_results(out)[0]
+            jobs = identified(jobs, self.settings)  # which takes a while where there are many
         kept = [row for row in rows if not (retry_failed and row.failed)]
         done = {row.job for row in kept}
         keys = {(row.policy, row.scenario, row.seed) for row in kept if any_version}

@@ -14,7 +14,8 @@ from pushplan.errors import short
 from pushplan.evaluation.run.jobs import JobSettings
 from pushplan.evaluation.run.policy_specs import PolicySpec, parse_policy, policy_names
 from pushplan.files.safe_files import known_keys
-from pushplan.scenarios.suite import distinct
+from pushplan.imports.named_objects import absolute
+from pushplan.scenarios.suite import distinct, seeds_of
 from pushplan.world import Deadline, SchemaError
 from pushplan.world.checks import (
     choice,
@@ -37,8 +38,8 @@ _KEYS = ("schema", "name", "suites", "policies", "episodes", "seed", "metrics", 
 _MORE = ("observation", "latency_factor", "clock", "memory_limit_mb", "traces", "misfits")
 _MISFITS = ("refuse", "skip")
 _POLICY = ("policy", "label", "parameters", "sweep", "deadline_s")
-_SUITE = ("suite", "scenarios", "worlds", "episodes", "seed", "variations", "policies")
-_WORLDS = ("simulator", "preset")
+_SUITE = ("suite", "scenarios", "worlds", "task", "episodes", "seed", "variations", "policies")
+_MADE = ("simulator", "preset")
 _FILE = re.compile(
     r"(.*[=:])?([^=:]+(?:\.(?:onnx|zip)|\.(?:py|onnx|zip)(?=:[^:]*$)))(:[^:]*)?", re.DOTALL
 )
@@ -111,17 +112,19 @@ def _suite(given: object, episodes: int, each: int, seed: int, folder: Path) -> 
         seed: default.
         folder: where paths begin.
     """
-    from pushplan.scenarios import Suite, load_scenarios, suite, world_suite
+    from pushplan.envs.registry import default_preset
+    from pushplan.scenarios import Scenario, Suite, load_scenarios, suite, world_suite
 
     entry = {"suite": given} if isinstance(given, str) else given
-    here = isinstance(entry, Mapping) and "worlds" in entry
-    known_keys("suite", entry, (*_SUITE, *_WORLDS, "label") if here else _SUITE, ())
+    made = isinstance(entry, Mapping) and ("worlds" in entry or "task" in entry)
+    known_keys("suite", entry, (*_SUITE, *_MADE, "label") if made else _SUITE, ())
     assert isinstance(entry, Mapping)
-    if sum(kind in entry for kind in ("suite", "scenarios", "worlds")) != 1:
+    if sum(kind in entry for kind in ("suite", "scenarios", "worlds", "task")) != 1:
         raise SchemaError(
-            "an entry of suites has either 'suite', a name, 'scenarios', a file, or 'worlds', "
-            f"folders and files: got {short(dict(entry))}"
+            "an entry of suites has either 'suite', a name, 'task', a name or 'file.py:Class', "
+            f"'scenarios', a file, or 'worlds', folders and files: got {short(dict(entry))}"
         )
+    options = {key: expect(key, entry[key], str) for key in _MADE if key in entry}
     first = integer("seed", entry.get("seed", seed), low=0)
     if "scenarios" in entry:
         path = _path(expect("scenarios", entry["scenarios"], str), folder)
@@ -134,18 +137,26 @@ def _suite(given: object, episodes: int, each: int, seed: int, folder: Path) -> 
             [_path(expect("worlds", name, str), folder) for name in _list("worlds", worlds)],
             episodes=entry.get("episodes", each),
             first_seed=first,
-            **{key: expect(key, entry[key], str) for key in _WORLDS if key in entry},
+            **options,
         )
+    elif "task" in entry:
+        task = absolute(expect("task", entry["task"], str), folder)
+        simulator = options.get("simulator", "pymunk")
+        preset = options.get("preset") or default_preset(task, simulator)
+        start = Scenario(task, simulator, preset, seed=first)
+        found = seeds_of(start, entry.get("episodes", episodes))
     else:
         episodes = integer("episodes", entry.get("episodes", episodes), low=1)
         found = suite(entry["suite"], episodes=episodes, first_seed=first)
     changes = entry.get("variations", {})
     if not isinstance(changes, Mapping):
         raise SchemaError(f"variations must be a mapping, got {short(changes)}")
+    words = ",".join(f"{key}={value}" for key, value in changes.items())
+    if isinstance(changes.get("robot"), str):
+        changes = {**changes, "robot": absolute(changes["robot"], folder)}
     scenarios = tuple(
         replace(one, variations={**one.variations, **changes}) for one in found.scenarios
     )
-    words = ",".join(f"{key}={value}" for key, value in changes.items())
     name = expect("label", entry.get("label", found.name), str)
     return Suite(f"{name}[{words}]" if words else name, found.version, scenarios)
 

@@ -8,12 +8,20 @@ import importlib
 import importlib.util
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Set
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from pushplan.errors import InvalidInputError, is_a_users, unknown_name_message
+from pushplan.errors import (
+    MOST_CHOICES,
+    InvalidInputError,
+    describe,
+    is_a_users,
+    short,
+    unknown_name_message,
+)
+from pushplan.imports.on_demand import look_up
 
 _imported: dict[str, tuple[str, tuple[int, int]]] = {}
 """Modules of users that `load_object` has brought along: their files, and versions of these."""
@@ -54,14 +62,59 @@ def load_object(spec: str) -> Any:
     return getattr(module, name)
 
 
-def objects_of_file(path: str | Path) -> dict[str, Any]:
-    """The classes and functions that a file defines, by name, in its order.
+def absolute(spec: str, folder: str | Path = "") -> str:
+    """A text with the path of its ``file.py:`` made absolute, from a folder on; others as is."""
+    where, colon, name = spec.rpartition(":")
+    if not where.endswith(".py"):
+        return spec
+    return f"{Path(folder, Path(where).expanduser()).resolve()}{colon}{name}"
 
-    What it imports from elsewhere, and what begins with an underscore, is left out. Errors are
-    those of `load_object`.
+
+def load_users(kind: str, spec: str) -> Any:
+    """Import the class or function that a user's text names; ``kind`` is its name in errors.
+
+    Raises:
+        InvalidInputError: if there is no such thing, or its file raises: with what, and where.
     """
+    try:
+        if spec.endswith(".py"):
+            raise InvalidInputError(names_to_give(spec))
+        found = load_object(spec)
+    except MemoryError:
+        raise
+    except (Exception, SystemExit) as error:
+        said = describe(error)
+        if isinstance(error, InvalidInputError):
+            said = str(error)
+        raise InvalidInputError(f"cannot load {kind} {spec!r}: {said}") from error
+    if not callable(found):
+        raise InvalidInputError(
+            f"{kind} {spec!r} must be a class or a function, got {short(found)}"
+        )
+    return found
+
+
+def look_up_or_load(kind: str, table: Mapping[str, str], name: object) -> Any:
+    """Import what a name stands for in a table, or what ``"file.py:Name"`` itself names.
+
+    Raises:
+        UnknownNameError: if it is neither in the table nor of that form.
+        InvalidInputError: as `load_users`.
+        MissingDependencyError: if a library that it needs is not installed.
+    """
+    if isinstance(name, str) and (":" in name or name.endswith(".py")):
+        return load_users(kind, name)
+    return look_up(kind, table, name)
+
+
+def names_to_give(file: str, methods: Set[str] = frozenset()) -> str:
+    """Say what to give instead of a file alone: what it defines, or classes with such a method."""
     with _fresh_modules():
-        return _callables_of(_load_file(Path(path)))
+        found = _callables_of(_load_file(Path(file)))
+    if methods:
+        found = {name: one for name, one in found.items() if methods & {*dir(one)}}
+    named = " or ".join([f"{file}:{name}" for name in found][:MOST_CHOICES])
+    return f"names no class or function: give {named or 'one that has some'}"
 
 
 def import_path(folder: str | None = None) -> list[str]:

@@ -25,12 +25,13 @@ EXTRAS = {
     "rosbags": "ros",
     "pyarrow": "parquet",
     "distributed": "cluster",
-    "h5py": "learn",
-    "minari": "learn",
-    "onnx": "learn",
-    "stable_baselines3": "learn",
-    "tensorboard": "learn",
-    "torch": "learn",
+    "h5py": "train",
+    "minari": "train",
+    "moviepy": "train",
+    "onnx": "train",
+    "stable_baselines3": "train",
+    "tensorboard": "train",
+    "torch": "train",
 }
 """Library -> the extra of pushplan that brings it."""
 

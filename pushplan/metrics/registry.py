@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Literal, cast
 
 from pushplan.errors import describe, short
-from pushplan.imports.named_objects import load_object
+from pushplan.imports.named_objects import load_users
 from pushplan.imports.on_demand import Registered
 from pushplan.world import Episode, InvalidInputError, UnknownNameError
 
@@ -178,15 +178,4 @@ def metric_function(name: str) -> Callable[[Episode], float | None]:
     target = METRICS[name].function if name in METRICS else name
     if ":" not in target:
         raise UnknownNameError("metric", name, METRICS)
-    try:
-        function = load_object(target)
-    except MemoryError:
-        raise
-    except (Exception, SystemExit) as error:  # whatever a user's file raises
-        said = describe(error)
-        if isinstance(error, InvalidInputError):
-            said = str(error)
-        raise InvalidInputError(f"cannot load metric {name!r}: {said}") from error
-    if not callable(function):
-        raise InvalidInputError(f"metric {name!r} is no function, but {short(function)}")
-    return cast("Callable[[Episode], float | None]", function)
+    return cast("Callable[[Episode], float | None]", load_users("metric", target))

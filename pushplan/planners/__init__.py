@@ -6,7 +6,6 @@ from pushplan.planners.registry import (
     make_policy,
     planner_names,
     policy_names,
-    warm_up,
 )
 from pushplan.world import Deadline, MaxIterations, Planner, PlanResult, PlanStatus, Policy, World
 
@@ -31,7 +30,6 @@ __all__ = [
     "planner_names",
     "policy_for",
     "policy_names",
-    "warm_up",
 ]
 
 __getattr__, __dir__ = lazy_names(

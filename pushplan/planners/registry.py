@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import warnings
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from typing import Any, cast
@@ -129,20 +128,3 @@ def _made(kind: str, name: str, table: Mapping[str, str], options: dict[str, Any
         return changed
     made.planner = changed
     return made
-
-
-def warm_up(*names: str) -> None:
-    """Import these policies, and do nothing else: deprecated, gone in the next release.
-
-    Planners were compiled on first use once, so that they had to run before a deadline counted.
-
-    Args:
-        names: of `policy_names()`.
-
-    Raises:
-        UnknownNameError: if there is no such policy.
-    """
-    message = "warm_up does nothing any more: planners are compiled when pushplan is installed"
-    warnings.warn(message, DeprecationWarning, stacklevel=2)
-    for name in names:
-        look_up("policy", POLICIES, name)

@@ -14,6 +14,7 @@ from typing import Any
 from pushplan.errors import short
 from pushplan.files.safe_files import known_keys, read_data
 from pushplan.files.safe_yaml import dump
+from pushplan.imports.named_objects import absolute
 from pushplan.world import SchemaError
 from pushplan.world.checks import integer
 
@@ -23,6 +24,7 @@ SCHEMA = "pushplan-scenarios/1"
 Value = bool | int | float | str
 _KEYS = ("task", "simulator", "preset", "variations", "seed", "name")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
+_OWN_TASK = re.compile(r"[^\x00-\x1f\x7f]{1,1000}:[A-Za-z_][A-Za-z0-9_]*")
 _OWN_NAME = re.compile(r"([^/\x00-\x1f\x7f]{1,200}/)?[^/\x00-\x1f\x7f]{1,200}")
 
 
@@ -53,7 +55,8 @@ class Scenario:
     """A start that always gives the same scene.
 
     Args:
-        task: such as ``"maze"``.
+        task: such as ``"maze"``, or a class of a user as ``"file.py:Class"``, whose path becomes
+            absolute, or ``"module:Class"``.
         simulator: such as ``"pymunk"``.
         preset: set of dimensions, ``"benchmark"`` or ``"testbed"``.
         variations: what departs from the preset, by name; each task lists its own.
@@ -77,8 +80,10 @@ class Scenario:
     def __post_init__(self) -> None:
         for key in ("task", "simulator", "preset"):
             value = getattr(self, key)
-            if not isinstance(value, str) or not _NAME.fullmatch(value):
+            own = key == "task" and isinstance(value, str) and _OWN_TASK.fullmatch(value)
+            if not own and not (isinstance(value, str) and _NAME.fullmatch(value)):
                 raise SchemaError(f"scenario.{key} must be a plain name, got {short(value)}")
+        object.__setattr__(self, "task", absolute(self.task))
         if not isinstance(self.variations, Mapping):
             raise SchemaError(
                 f"scenario.variations must be a mapping, got {short(self.variations)}"
@@ -107,7 +112,7 @@ class Scenario:
             return f"{self.name}-{self.seed}"
         text = json.dumps(dict(self.variations), sort_keys=True)
         digest = hashlib.sha256(text.encode()).hexdigest()[:8]
-        return f"{self.task}-{self.simulator}-{self.preset}-{digest}-{self.seed}"
+        return f"{self.task.rpartition(':')[2]}-{self.simulator}-{self.preset}-{digest}-{self.seed}"
 
     def to_dict(self) -> dict[str, Any]:
         """The scenario as plain values, ready for JSON or YAML."""

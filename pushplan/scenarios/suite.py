@@ -127,6 +127,14 @@ def suite(name: str, *, episodes: int | None = None, first_seed: int = 0) -> Sui
     return Suite(name, entry["version"], scenarios)
 
 
+def seeds_of(start: Scenario, episodes: int) -> Suite:
+    """A scenario with its seed and those that follow, as a suite with the name of its task."""
+    count = integer("episodes", episodes, low=1, high=MOST_EPISODES)
+    seeds = range(start.seed, start.seed + count)
+    name = start.task.rpartition(":")[2]
+    return Suite(name, 1, tuple(replace(start, seed=seed) for seed in seeds))
+
+
 def world_suite(
     worlds: str | Path | Sequence[str | Path],
     *,

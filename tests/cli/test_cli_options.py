@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pushplan.cli import main
+from pushplan.cli import build_parser, main
 
 RUN = ["run", "--task", "box_delivery", "--policy", "random"]
 
@@ -42,3 +42,25 @@ def test_any_observation_of_the_task_can_be_asked_for(
     assert out.exists()
     assert main([*RUN, "--observation", "spatal"]) == 2
     assert "valid: image, spatial, state" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", [["run", "--policy"], ["bench", "--policies"]])
+@pytest.mark.parametrize(
+    "more", [["--simulator", "mujoco"], ["--preset", "testbed"], ["--robot", "jackal"]]
+)
+def test_a_suite_takes_nothing_that_only_a_task_has(
+    command: list[str], more: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*command, "straight", "maze-2d-3", *more]) == 2
+    assert f"{more[0][2:]} needs --task instead" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["--policy", "--policies"])
+def test_policies_are_given_by_one_option_of_two_spellings(name: str) -> None:
+    parser = build_parser()
+    assert parser.parse_args(["run", "maze-2d-3", name, "straight"]).policy == "straight"
+    assert parser.parse_args(["bench", "maze-2d-3", name, "straight,namo"]).policies == (
+        "straight,namo"
+    )
+    export = ["dataset", "export", "--task", "maze", "--episodes", "1", "--out", "few"]
+    assert parser.parse_args([*export, name, "straight"]).policy == "straight"

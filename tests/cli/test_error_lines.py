@@ -136,7 +136,11 @@ def test_the_most_frequent_of_several_reasons(
         ("torn.py:X", 2, "'X' cannot be made: SyntaxError: invalid syntax (torn.py, line 1)"),
         ("lost.py:X", 2, "No module named 'no_such_library' (lost.py:1)"),
         ("mine.py:good", 2, "unknown name in mine.py 'good'; did you mean 'Good'? (valid: "),
-        ("mine.py", 2, "policy 'mine.py' names no class: give mine.py:Good or mine.py:Raises or "),
+        (
+            "mine.py",
+            2,
+            "'mine.py' names no class or function: give mine.py:Good or mine.py:Raises ",
+        ),
         ("torn.py", 2, "SyntaxError: invalid syntax (torn.py, line 1)"),
     ],
 )

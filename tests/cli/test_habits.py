@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import csv
 import json
 import re
 import sys
+import tomllib
+from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -51,6 +55,7 @@ USERS_MISTAKES = {
     "runs merge": [["FILE/run", "FOLDER"]],
     "runs rescore": [["FOLDER"]],
     "runs reproduce": [["FOLDER", "--job", "3f"]],
+    "runs verify": [["FOLDER"], ["FOLDER", "--fraction", "0"]],
     "runs salvage": [["FOLDER", "FILE/new"]],
     "runs export": [["FOLDER", "rows.csv"], ["FOLDER", "/no/such/folder/rows.csv"]],
     "ice": [[], ["--concentration", "0.1", "--out", "/no/such/folder/field.json"]],
@@ -138,6 +143,52 @@ def test_list_alone_says_what_can_be_listed(capsys: pytest.CaptureFixture[str]) 
         listed = json.loads(capsys.readouterr().out)
         assert len(listed) == int(count)
         assert all(len(one) > 2 and all(one.values()) for one in listed)
+
+
+def test_what_a_machine_reads_is_json_on_demand() -> None:
+    text = files("pushplan.cli").joinpath("commands.toml").read_text("utf-8")
+    commands = {key: one for key, one in tomllib.loads(text).items() if key != "shared"}
+    commands |= {f"runs {key}": one for key, one in commands.pop("runs")["commands"].items()}
+    without = {key for key, one in commands.items() if "'json'" not in str(one["options"])}
+    # a page, a window, files and a socket; `describe` prints JSON alone
+    writers = {"demo", "teleop", "train", "dataset", "runs export", "serve"}
+    assert without == {*writers, "describe"}
+
+
+def test_commands_print_one_json_value_and_nothing_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+
+    def result(*arguments: str) -> Any:
+        assert main([*arguments, "--json"]) == 0
+        return json.loads(capsys.readouterr().out)
+
+    one = ["--policy", "straight", "--render", "end.png", "--out", "episode.npz"]
+    row = result("run", "maze-2d-3", *one)
+    assert row["policy"] == "straight" and row["success"] is True
+    assert main(["bench", "maze-2d-3", "--policies", "straight", "--episodes", "1"]) == 0
+    capsys.readouterr()
+    with open("runs/maze-2d-3/results.csv", encoding="utf-8") as file:
+        (stored,) = csv.DictReader(file)
+    assert [*row] == [*stored] and f"{row['E_nav']}" == stored["E_nav"]
+    Path("study.yaml").write_text(
+        "schema: pushplan-experiment/1\nepisodes: 1\nsuites: [maze-2d-3, area-clearing-2d-10]\n"
+        "policies: [straight, greedy]\n"
+    )
+    assert result("experiment", "study.yaml", "--check")["new"] == 2
+    assert result("report", "runs/maze-2d-3")["policies"][0]["policy"] == "straight"
+    (table,) = result("report", "runs/maze-2d-3", "--metrics", "steps")
+    assert "steps" in str(table)
+    assert result("runs", "status", "runs/maze-2d-3")["done"] == 1
+    assert result("runs", "rescore", "runs/maze-2d-3")["episodes"] == 1
+    assert result("runs", "merge", "runs/both", "runs/maze-2d-3")["added"] == 1
+    assert result("runs", "salvage", "runs/both", "runs/saved")["rows"] == 1
+    assert result("runs", "reproduce", "runs/both", "--job", stored["job"])["same"] is True
+    assert result("ice", "--concentration", "0.1", "--out", "field.json")["floes"] > 0
+    stress = ["--conditions", "undisturbed", "--episodes", "1", "--workers", "0"]
+    sheet = result("stress", "straight", "maze-3d-3", *stress)
+    assert sheet["rows"][0]["condition"] == "undisturbed"
 
 
 def test_plan_and_score_print_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -7,11 +7,20 @@ import sqlite3
 import zipfile
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from pushplan.cli import main
-from pushplan.evaluation import JobSettings, Results, bench
+from pushplan.envs import PushEnv
+from pushplan.evaluation import (
+    Experiment,
+    JobSettings,
+    Results,
+    UnusablePolicyError,
+    bench,
+    parse_policies,
+)
 from pushplan.evaluation.run.compatibility import incompatibility
 from pushplan.evaluation.run.policy_specs import PolicySpec
 from pushplan.learned.loading import weights_of
@@ -91,6 +100,24 @@ def test_a_policy_has_to_suit_one_start_of_a_mixed_suite() -> None:
     spec = PolicySpec("gtsp", "gtsp")
     fits = [incompatibility(spec, start, JobSettings()) is None for start in starts]
     assert fits == [start.task in ("box_delivery", "area_clearing") for start in starts]
+
+
+def test_a_check_makes_the_bodies_of_a_start_once_for_each_action_mode(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    made = []
+    reset = PushEnv.reset
+
+    def counted(env: PushEnv, **options: Any) -> Any:
+        made.append(env.action_mode)
+        return reset(env, **options)
+
+    monkeypatch.setattr(PushEnv, "reset", counted)
+    policies = parse_policies("straight,namo,kinodynamic-rrt,maze-ppo,greedy")
+    study = Experiment("few", (suite("maze-2d-3", episodes=9),), tuple(policies[:4]))
+    assert not study.skipped and len(made) == len(set(made)) <= 2
+    with pytest.raises(UnusablePolicyError, match="'greedy' cannot run maze"):
+        Experiment("few", study.suites, tuple(policies))
 
 
 def test_rows_of_an_earlier_version_can_be_read_and_continued(tmp_path: Path) -> None:

@@ -24,8 +24,9 @@ from pushplan.evaluation import (
     rescore,
     run_batch,
     run_status,
+    verify,
 )
-from pushplan.scenarios import suite
+from pushplan.scenarios import Scenario, Suite, suite
 from pushplan.world import InvalidInputError, SchemaError
 
 SETTINGS = JobSettings(make_env=f"{HERE}:make_env", timeout_s=5.0, dry_run=False)
@@ -151,6 +152,52 @@ class TestReproduce:
                 reproduce(tmp_path, job)
         with pytest.raises(InvalidInputError, match="none of pushplan's own"):
             reproduce(tmp_path, Results.load(tmp_path).rows[0].job)
+
+
+class TestVerify:
+    def test_a_sample_comes_out_the_same(self, stored: Path) -> None:
+        found = verify(stored, fraction=0.3, seed=1, workers=1)
+        assert (len(found.checked), found.jobs, found.differing, found.left_out) == (2, 4, (), 0)
+        other = verify(stored, workers=1)
+        assert len(other.checked) == 1  # 5 % of four is one
+        rows = Results.load(stored).rows
+        assert all(one.stored in rows for one in (*found.checked, *other.checked))
+
+    def test_what_differs_is_said_with_both_values(
+        self, stored: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        merge(tmp_path, [stored])
+        row = next(row for row in Results.load(tmp_path).rows if row.policy == "straight")
+        with sqlite3.connect(tmp_path / "results.db") as db:
+            db.execute("UPDATE results SET E_nav = 0.25 WHERE job = ?", (row.job,))
+        command = ["runs", "verify", str(tmp_path), "--fraction", "1", "--workers", "1"]
+        assert main(command) == 1
+        said = capsys.readouterr()
+        assert said.out.startswith("3 of 4 jobs that ran again came out the same to the byte")
+        assert f"{row.scenario} is not the same: E_nav 0.25 -> {row.E_nav!r}\n" in said.err
+        assert main([*command, "--json"]) == 1
+        checked = json.loads(capsys.readouterr().out)["checked"]
+        (bad,) = [one for one in checked if not one["same"]]
+        assert bad["differing"] == ["E_nav"] and bad["again"]["E_nav"] == row.E_nav
+
+    def test_a_run_without_episodes_is_compared_by_its_rows(self, tmp_path: Path) -> None:
+        starts = (Scenario("maze", variations={"boxes": 1}),)
+        straight = (PolicySpec("straight", "straight"),)
+        Experiment("few", (Suite("few", 1, starts),), straight, traces="none").run(tmp_path)
+        assert verify(tmp_path, workers=1).checked[0].same
+
+    def test_what_cannot_be_made_again_is_left_out_and_said(
+        self, stored: Path, tmp_path: Path
+    ) -> None:
+        run(tmp_path / "own", range(2), "Ahead")
+        with pytest.raises(InvalidInputError, match="none of pushplan's own"):
+            verify(tmp_path / "own", workers=1)
+        merge(tmp_path / "own", [stored])
+        found = verify(tmp_path / "own", fraction=0.01, workers=1)
+        assert (found.jobs, found.left_out, len(found.checked)) == (6, 2, 1)
+        assert "none of pushplan's own" in found.why
+        with pytest.raises(InvalidInputError, match=r"fraction must lie in \(0, 1\], got 1.5"):
+            verify(stored, fraction=1.5)
 
 
 class TestRescore:

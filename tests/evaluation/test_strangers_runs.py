@@ -44,6 +44,7 @@ COMMANDS = (
     ["runs", "export", "theirs/run", "out/rows.csv"],
     ["runs", "compare", "theirs/run", "theirs/run", "--fail-on", "steps<0"],
     ["runs", "reproduce", "theirs/run", "--job", "0"],
+    ["runs", "verify", "theirs/run", "--workers", "1"],
 )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -175,6 +176,9 @@ def test_files_that_are_not_there(tmp_path: Path) -> None:
 def test_command_writes_a_tour(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = written(tmp_path, explicit("FULL_MATRIX", LAYOUTS["FULL_MATRIX"]))
     out = tmp_path / "small.gtsp-tour"
+    assert main(["gtsp", str(path), "--iterations", "10", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["status"] == "optimal" and sorted(found["nodes"]) == [1, 2, 4]
     assert main(["gtsp", str(path), "--iterations", "10", "--out", str(out)]) == 0
     assert "optimal, cost 10, lower bound 10" in capsys.readouterr().out
     assert sorted(read_tour(out)) == [0, 1, 3]

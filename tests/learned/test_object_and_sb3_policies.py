@@ -106,7 +106,7 @@ class TestSb3:
 
     def test_without_the_library(self, model, monkeypatch):
         monkeypatch.setitem(sys.modules, "stable_baselines3", None)
-        with pytest.raises(MissingDependencyError, match=r"pushplan\[learn\]"):
+        with pytest.raises(MissingDependencyError, match=r"pushplan\[train\]"):
             Sb3Policy(model.path, trust=True)
 
     def test_files_that_are_none(self, model, tmp_path):

@@ -26,11 +26,6 @@ def as_rectangle(outline: FloatArray) -> tuple[FloatArray, FloatArray, float] | 
     return outline.mean(axis=0), 0.5 * lengths[:2], heading
 
 
-def yaw_quaternion(heading: float) -> FloatArray:
-    """(4,) w, x, y, z of a turn about the vertical axis."""
-    return np.array([math.cos(0.5 * heading), 0.0, 0.0, math.sin(0.5 * heading)])
-
-
 def add_geom(
     spec: Any,
     body: Any,

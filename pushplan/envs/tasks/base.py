@@ -71,21 +71,21 @@ class Task(ABC):
     name: ClassVar[str]
     goal_kind: Literal["robot", "objects"] = "robot"
     """Who has a goal: decides which metrics apply."""
-    preset_table: ClassVar[Mapping[str, Preset]]
+    preset_table: ClassVar[Mapping[str, Preset]] = {"benchmark": Preset()}
     """Dimensions by the name of the preset."""
-    variation_class: ClassVar[type[TaskVariations]]
-    presets: ClassVar[tuple[str, ...]]
+    variation_class: ClassVar[type[TaskVariations]] = TaskVariations
+    presets: ClassVar[tuple[str, ...]] = ("benchmark",)
     """Sets of dimensions; the first is the default."""
-    solid_presets: ClassVar[tuple[str, ...]]
+    solid_presets: ClassVar[tuple[str, ...]] = ()
     """Those with a third dimension; the first is the default of an engine that needs one."""
     actions: ClassVar[tuple[str, ...]]
     """Action modes that make sense; the first is the default."""
-    observations: ClassVar[tuple[str, ...]]
+    observations: ClassVar[tuple[str, ...]] = ("state",)
     """Names of the observations; the first is the default."""
 
     control_step: float
     """Time between two commands to the robot [s]."""
-    materials: Materials
+    materials: Materials = Materials()
     robot: RobotModel
     state_objects: int = 20
     """Objects that the state observation has room for; the nearest where there are more."""
@@ -145,8 +145,15 @@ class Task(ABC):
         name = next(iter(preset.robots)) if name is None else name
         solid = preset.materials.solids is not None  # then heights and wheels are asked for
         others = () if solid else sorted(robots().keys() - ROBOTS)
+        own = name in others or ":" in name
         try:
-            choice("robot", name, (*preset.robots, *others))
+            if solid and ":" in name:
+                raise InvalidInputError(
+                    f"robot {name!r} has no third dimension, which this preset needs "
+                    f"(valid: {', '.join(preset.robots)})"
+                )
+            if not own:
+                choice("robot", name, (*preset.robots, *others))
             usual = preset.robots.get(name, {}).get("bumper", preset.bumper)
             if usual is None and bumper not in (None, "none"):
                 raise InvalidInputError(
@@ -156,9 +163,9 @@ class Task(ABC):
         except InvalidInputError as error:
             raise ScenarioError(f"{self.name}: {error}") from error
         options = {}
-        if usual is not None:
+        if usual is not None and not (own and bumper is None):
             options["bumper"] = bumper or usual
-        make = make_robot if name in others else preset.robot
+        make = make_robot if own else preset.robot
         robot: RobotModel = make(name, drive_of(self.action), **options)
         self._drive(robot)
         if self.materials.solids is not None and name in SOLIDS:

@@ -48,7 +48,7 @@ class ManipulationVariations(TaskVariations):
     box_size: PositiveFloat | None = None
     objects: Objects = "boxes"  # shapes: ``"boxes"``, or ``"many"`` of them
     box_yaw: Yaw  # headings of the boxes at the start, ``"aligned"`` or ``"random"``
-    robot: str | None = None  # one of the preset's robots
+    robot: str | None = None  # one of the preset's robots, or one of a user's
     # one of `pushplan.world.BUMPERS`, where the robot's can be changed
     bumper: Annotated[str, OneOf(BUMPERS)] | None = None
     random_start: bool  # True for a random start of the robot

@@ -66,6 +66,7 @@ class MazeVariations(TaskVariations):
     # True if the robot starts anywhere instead of at the preset's start
     random_start: bool | None = None
     touching: bool | None = None  # True if boxes may start in touch with the robot
+    robot: str | None = None  # one of the preset's robots, or one of a user's
     # bumper in front of the testbed's robot, one of `pushplan.world.BUMPERS`
     bumper: Annotated[str, OneOf(BUMPERS)] | None = None
     time_limit: PositiveFloat | None = None  # when the episode is cut off [s]

@@ -35,6 +35,7 @@ class OfficeVariations(WorldVariations):
     polygons: Annotated[int, Limits(100, MOST_POLYGONS)] = 1000  # about how many are static
     # fraction of the doors that have a box in them, and boxes elsewhere for each room
     boxes: Fraction = 0.3
+    robot: str | None = None  # one of the preset's robots
     bumper: Annotated[str, OneOf(BUMPERS)] | None = None  # of the robot
 
 

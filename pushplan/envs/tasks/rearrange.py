@@ -43,7 +43,7 @@ class RearrangeVariations(WorldVariations):
     # of ReloPush, whose room and objects then count, and the number of one, drawn if None
     instances: str | None = None
     instance: NonNegativeInt | None = None
-    robot: str | None = None  # one of the preset's robots
+    robot: str | None = None  # one of the preset's robots, or one of a user's
     bumper: Annotated[str, OneOf(BUMPERS)] | None = None  # of the robot
 
 

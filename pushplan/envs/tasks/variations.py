@@ -67,7 +67,7 @@ class TaskVariations(CheckedFields):
     # scale and spreads
     parameters: Annotated[str, OneOf(("known", "unknown"))] = "known"
 
-    task: ClassVar[str]
+    task: ClassVar[str] = "this task"
     """Name of the task."""
 
     def limit(self, robot: RobotModel) -> RobotModel:

@@ -17,6 +17,7 @@ from pushplan.world import (
     PlansBesideDriving,
     Policy,
     PushplanError,
+    World,
     stream,
 )
 
@@ -49,14 +50,18 @@ def misfits(
     """
     known: dict[tuple[str, str], str | None] = {}
     found: dict[tuple[str, str], str] = {}
+    worlds: dict[tuple[str, str], World] = {}
+    starts = {
+        suite.name: {Job(specs[0], scenario).title: scenario for scenario in suite.scenarios}
+        for suite in suites
+    }
     for spec in specs:
         first = ""
         wanted = [one for one in suites if is_wanted(spec, one, only or {})]
         for suite in wanted:
-            starts = {Job(spec, scenario).title: scenario for scenario in suite.scenarios}
-            for title, scenario in starts.items():
+            for title, scenario in starts[suite.name].items():
                 if (spec.label, title) not in known:
-                    known[spec.label, title] = incompatibility(spec, scenario, settings)
+                    known[spec.label, title] = incompatibility(spec, scenario, settings, worlds)
                 if (reason := known[spec.label, title]) is None:
                     found.pop((suite.name, spec.label), None)
                     break
@@ -72,11 +77,17 @@ def is_wanted(spec: PolicySpec, suite: Suite, only: Mapping[str, Sequence[str]])
     return spec.label in only.get(suite.name, [spec.label])
 
 
-def incompatibility(spec: PolicySpec, scenario: Any, settings: JobSettings) -> str | None:
+def incompatibility(
+    spec: PolicySpec,
+    scenario: Any,
+    settings: JobSettings,
+    worlds: dict[tuple[str, str], World] | None = None,
+) -> str | None:
     """Why a policy cannot run a scenario; None if it can.
 
     The policy is made, and so is its environment. A policy of ours and a network also take one
     step; code of a user is not asked for any, as only a worker process can end it by force.
+    Starts are kept in ``worlds`` by scenario and action mode: their bodies take most of the time.
 
     Raises:
         UnusablePolicyError: if the policy cannot be made at all.
@@ -96,21 +107,28 @@ def incompatibility(spec: PolicySpec, scenario: Any, settings: JobSettings) -> s
         return str(error)
     with contextlib.closing(env):
         if spec.is_ours:
-            return _first_step(policy, scenario, env)
+            return _first_step(policy, scenario, env, {} if worlds is None else worlds)
     return None
 
 
-def _first_step(policy: Policy, scenario: Any, env: Any) -> str | None:
+def _first_step(
+    policy: Policy, scenario: Any, env: Any, worlds: dict[tuple[str, str], World]
+) -> str | None:
     """Why the policy refuses the start of a scenario; planning calls end after an iteration."""
     try:
-        observation, _ = env.reset(seed=scenario.seed)
+        start = (scenario.key, env.action_mode)
+        if start not in worlds:
+            env.reset(seed=scenario.seed)
+            worlds[start] = env.world
+        world = worlds[start]
+        observation = env.observation_builder.observe(world)
     except Exception:
         return None  # that is not the policy's fault
     try:
-        policy.reset(env.world, stream(scenario.seed, "policy"))
+        policy.reset(world, stream(scenario.seed, "policy"))
         if isinstance(policy, PlansBesideDriving):
             policy.plan_with(ImmediateExecutor(MaxIterations(1)))
-        policy.act(env.world, observation)
+        policy.act(world, observation)
     except InvalidInputError as error:  # its way to refuse a world
         return str(error)
     except Exception:

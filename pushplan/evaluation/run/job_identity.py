@@ -19,6 +19,7 @@ from pushplan.evaluation.store.source_digests import file_digest, source_digest
 from pushplan.metrics import METRICS
 from pushplan.planners.registry import PLANNERS, POLICIES
 from pushplan.world import InvalidInputError
+from pushplan.world.stored.robots import robots
 
 _MOST_DIFFERENCES = 4
 _OURS = "pushplan."
@@ -87,14 +88,19 @@ def _spec(
 def _files(job: Job, settings: JobSettings) -> dict[str, str]:
     """Hash of each file that a variation names, and of code that is registered and not ours."""
     scenario = job.scenario
-    named = getattr(scenario, "variations", {}).items()
-    files = {name: file_digest(path).strip() for name, path in named if name.endswith("_file")}
+    named = getattr(scenario, "variations", {})
+    files = {
+        name: file_digest(path).strip() for name, path in named.items() if name.endswith("_file")
+    }
+    robot = str(named.get("robot", ""))
+    task = str(scenario.task)
     sources = {
         "make_env": settings.make_env,
         "observation": settings.observation,
         "policy": {**PLANNERS, **POLICIES}.get(str(job.policy.source), ""),
         "simulator": SIMULATORS.get(str(scenario.simulator), ""),
-        "task": TASKS.get(str(scenario.task), ""),
+        "robot": robots().get(robot, robot),
+        "task": TASKS.get(task, task),
         **{f"metric {name}": metric.function for name, metric in METRICS.items()},
     }
     for name, source in sources.items():

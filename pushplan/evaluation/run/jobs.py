@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -61,7 +62,8 @@ class Job:
     def title(self) -> str:
         """The scenario without its seed, in words."""
         data = self.scenario.to_dict()
-        words = [str(data[key]) for key in ("task", "simulator", "preset") if key in data]
+        parts = [str(data[key]) for key in ("task", "simulator", "preset") if key in data]
+        words = map(os.path.basename, parts)  # of a user's task without its folder
         extra = [f"{key}={value}" for key, value in data.get("variations", {}).items()]
         return " ".join([*words, *extra])
 
@@ -153,10 +155,14 @@ class JobResult:
 def job_id(spec: Mapping[str, Any]) -> str:
     """Content hash of what `job_spec` gave, 32 hexadecimal digits.
 
-    Where a policy's file lies does not count: its content does, in ``identity``.
+    Where the file of a policy or a task lies does not count: its content does, in ``identity`` or
+    ``files``.
     """
     policy = {name: spec["policy"][name] for name in ("label", "identity")}
-    text = json.dumps({**spec, "policy": policy}, sort_keys=True)
+    scenario = dict(spec["scenario"])
+    if "task" in scenario:
+        scenario["task"] = os.path.basename(str(scenario["task"]))
+    text = json.dumps({**spec, "policy": policy, "scenario": scenario}, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 

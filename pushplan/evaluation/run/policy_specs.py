@@ -14,14 +14,14 @@ from typing import Any, cast
 
 import numpy as np
 
-from pushplan.errors import MOST_CHOICES, describe, place
+from pushplan.errors import describe, place
 from pushplan.evaluation.store.source_digests import (
     code_digest,
     file_digest,
     libraries_of,
     source_digest,
 )
-from pushplan.imports.named_objects import load_object, objects_of_file
+from pushplan.imports.named_objects import load_object, names_to_give
 from pushplan.imports.on_demand import missing
 from pushplan.world import InvalidInputError, Planner, Policy, PushplanError, UnknownNameError
 
@@ -324,26 +324,15 @@ def _parse_text(given: str, kind: str, names: Sequence[str]) -> PolicySpec:
         if not path.is_file():
             raise UnusablePolicyError(f"{kind} {given!r}: there is no file {file}")
         if not colon or not name:
-            raise UnusablePolicyError(f"{kind} {given!r} names no class: {_classes_to_give(file)}")
+            with _saying_what_fails("policy", file):
+                named = names_to_give(file, {"act", "plan", "predict"})
+            raise UnusablePolicyError(f"{kind} {given!r} {named}")
         return PolicySpec(label or name, f"{path}:{name}")
     if colon:
         return PolicySpec(label or name, source)
     if source not in names:
         raise UnknownNameError(kind, source, names)
     return PolicySpec(label or source, source)
-
-
-def _classes_to_give(file: str) -> str:
-    """Say what to give instead of a file alone: its classes that could be policies or planners."""
-    with _saying_what_fails("policy", file):
-        found = [
-            f"{file}:{name}"
-            for name, one in objects_of_file(file).items()
-            if isinstance(one, type) and {"act", "plan", "predict"} & {*dir(one)}
-        ]
-    if not found:
-        return f"{file} has no class with plan or act"
-    return f"give {' or '.join(found[:MOST_CHOICES])}"
 
 
 def parse_policies(

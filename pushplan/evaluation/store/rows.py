@@ -135,6 +135,10 @@ class ResultRow:
         rest = {n: v for n, v in values.items() if n not in metrics}
         return cls(**rest, metrics={n: v for n, v in metrics.items() if v is not None})
 
+    def by_column(self) -> dict[str, Any]:
+        """The values by column of ``results.csv``."""
+        return {name: getattr(self, name) for name in columns()}
+
     @property
     def setting(self) -> str:
         """Group in which episodes are averaged: the suite, or the scenario without its seed."""
@@ -283,7 +287,7 @@ def blank_row(policy: str, scenario: Any, status: Status, reason: str) -> Result
     }
     return ResultRow(
         policy=policy,
-        task=str(scenario.task),
+        task=str(scenario.task).rpartition(":")[2],
         simulator=str(scenario.simulator),
         scenario=str(scenario.key),
         seed=int(scenario.seed),

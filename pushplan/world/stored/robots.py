@@ -20,8 +20,9 @@ from typing import Any
 
 from pushplan.errors import UnknownNameError
 from pushplan.files.safe_files import read_data
-from pushplan.imports.on_demand import Registered, look_up
-from pushplan.world.checks import choice
+from pushplan.imports.named_objects import look_up_or_load
+from pushplan.imports.on_demand import Registered
+from pushplan.world.checks import choice, expect
 from pushplan.world.robot import Drive, RobotModel
 
 BUMPERS = ("none", "collector", "pusher", "navigation")
@@ -128,15 +129,16 @@ def make_robot(name: str, drive: Drive | str, **options: Any) -> RobotModel:
     """A robot by name.
 
     Args:
-        name: one of `robots()`.
+        name: one of `robots()`, or a function as ``"file.py:function"``, ``"module:function"``.
         drive: how it may move.
         options: of the function that makes it, as limits.
 
     Raises:
         UnknownNameError: if there is no such robot.
+        InvalidInputError: if the function cannot be loaded, or makes no `RobotModel`.
     """
-    robot: RobotModel = look_up("robot", robots(), name)(drive=drive, **options)
-    return robot
+    made = look_up_or_load("robot", robots(), name)(drive=drive, **options)
+    return expect(f"robot {name!r}", made, RobotModel)
 
 
 @functools.cache
