@@ -84,7 +84,7 @@ class PlacePushes:
         return pushes
 
     def of_waiting(self) -> list[PlacePush]:
-        """What `towards_places` has left out."""
+        """Pushes that `towards_places` has left out."""
         return self._waiting
 
     def making_room(self) -> list[PlacePush]:
