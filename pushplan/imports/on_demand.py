@@ -10,29 +10,18 @@ from typing import Any
 
 from pushplan.errors import MissingDependencyError, UnknownNameError
 
-EXTRAS = {
-    "PIL": "pictures",
-    "argcomplete": "completion",
-    "rich": "sim",
-    "gymnasium": "sim",
-    "mujoco": "sim",
-    "pymunk": "sim",
-    "onnxruntime": "learned",
-    "imageio_ffmpeg": "plots",
-    "jinja2": "plots",
-    "matplotlib": "plots",
-    "mcap": "ros",
-    "rosbags": "ros",
-    "pyarrow": "parquet",
-    "distributed": "cluster",
-    "h5py": "train",
-    "minari": "train",
-    "moviepy": "train",
-    "onnx": "train",
-    "stable_baselines3": "train",
-    "tensorboard": "train",
-    "torch": "train",
+_LIBRARIES = {
+    "pictures": "PIL",
+    "completion": "argcomplete",
+    "sim": "rich gymnasium mujoco pymunk",
+    "learned": "onnxruntime",
+    "plots": "imageio_ffmpeg jinja2 matplotlib",
+    "ros": "mcap rosbags",
+    "parquet": "pyarrow",
+    "cluster": "distributed",
+    "train": "h5py minari moviepy onnx stable_baselines3 tensorboard torch",
 }
+EXTRAS = {library: extra for extra, names in _LIBRARIES.items() for library in names.split()}
 """Library -> the extra of pushplan that brings it."""
 
 
