@@ -158,6 +158,7 @@ class TestVerify:
     def test_a_sample_comes_out_the_same(self, stored: Path) -> None:
         found = verify(stored, fraction=0.3, seed=1, workers=1)
         assert (len(found.checked), found.jobs, found.differing, found.left_out) == (2, 4, (), 0)
+        assert {one.stored.policy for one in found.checked} == {"random", "straight"}
         other = verify(stored, workers=1)
         assert len(other.checked) == 1  # 5 % of four is one
         rows = Results.load(stored).rows

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import tempfile
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -110,7 +111,7 @@ def verify(
     workers: int | None = None,
     progress: Progress | None = None,
 ) -> Verification:
-    """Run a random sample of the jobs of a run directory again, and compare.
+    """Run a random sample of the jobs of a run directory again, policies in turn, and compare.
 
     Args:
         path: run directory; it is only read.
@@ -137,8 +138,14 @@ def verify(
     if not known:
         raise InvalidInputError(f"nothing of {path} can be run again: {why}")
     count = max(1, math.ceil(fraction * len(known) - 1e-9))
-    chosen = sorted(rng.choice(len(known), count, replace=False).tolist())
-    checked = _run_again(path, [known[k] for k in chosen], workers=workers, progress=progress)
+    rounds: Counter[str] = Counter()
+    drawn: list[tuple[int, int, int]] = []
+    for k in rng.permutation(len(known)).tolist():  # all policies before the second of one
+        policy = known[k][0].row.policy
+        drawn.append((rounds[policy], len(drawn), k))
+        rounds[policy] += 1
+    chosen = [known[k] for *_, k in sorted(drawn)[:count]]
+    checked = _run_again(path, chosen, workers=workers, progress=progress)
     left_out = len(stored) - len(known)
     return Verification(tuple(checked), len(stored), left_out, why if left_out else "")
 
