@@ -18,6 +18,7 @@ from pushplan.world import (
     GoalLine,
     InvalidInputError,
     Movables,
+    ObjectGoals,
     Receptacle,
     RobotModel,
     StaticMap,
@@ -216,6 +217,22 @@ def test_state_holds_what_it_says() -> None:
     expected = [1, 2, 0, 1, 0, -4, 3, 0, 1, 0, 1, 0, 1, 0, -1, 1, 0, 0, 0, 0, 0]
     np.testing.assert_allclose(vector, expected, atol=1e-6)
     assert StateObservation(1).observe(world)[6:].tolist() == pytest.approx([0, 1, 0, -1, 1])
+
+
+def test_state_says_where_objects_belong() -> None:
+    world = World(
+        robot=scene().robot,
+        robot_pose=np.array([1.0, 2.0, math.pi / 2]),
+        static=scene().static,
+        movables=Movables.from_outlines([SQUARE, SQUARE], [[1.0, 5.0, 1.5], [0.0, 2.0, 0]]),
+        goal=ObjectGoals([0], [[2.0, 2.0, 0.0]], [0.1], [0.1], [4]),
+    )
+    rows = StateObservation(2, places=True).observe(world)[6:].reshape(2, 10)
+    np.testing.assert_array_equal(rows[:, :5], StateObservation(2).observe(world)[6:].reshape(2, 5))
+    np.testing.assert_allclose(rows[0, 5:], [0, -1, 1, 0, 1], atol=1e-6)  # a quarter turn is equal
+    assert not rows[1, 5:].any()
+    with pytest.raises(InvalidInputError, match="goal"):
+        StateObservation(2, places=True).observe(scene())
 
 
 def test_state_of_other_goals() -> None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar
 
 import numpy as np
 
 from pushplan.envs.tasks.presets import read_presets
 from pushplan.envs.tasks.room import RoomTask, WorldVariations
+from pushplan.observation import ObservationBuilder, StateObservation
 from pushplan.scenarios import generate_rearrangement, load_relopush
 from pushplan.scenarios.rearrangement import (
     ARRANGEMENTS,
@@ -75,6 +76,11 @@ class RearrangeTask(RoomTask):
         self.reach = 2.0 * math.hypot(*room)
         if wanted.instances is not None:  # a file that is not there is refused before a start
             load_relopush(wanted.instances, 0, robot=self.robot)
+
+    def observation(self, name: str) -> ObservationBuilder:
+        """The builder of an observation by name; states say where each object belongs."""
+        builder = super().observation(name)
+        return replace(builder, places=True) if isinstance(builder, StateObservation) else builder
 
     def start(self, rng: np.random.Generator) -> World:
         """A new room, or the next instance of the file."""
