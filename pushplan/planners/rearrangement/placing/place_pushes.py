@@ -25,6 +25,8 @@ from pushplan.world.stop import StopCheck
 
 # All lengths in circumscribed radii.
 _IN_THE_WAY = 18.0  # cost of an end on the place of another object, or in its only way
+_DETOUR = 2.0  # several pushes are looked for where the best costs more: times the distance,
+_MORE = 10.0  # and so much more
 _ROOM_COST = 10.0  # of moving an object out of the way
 _NO_RETURN = 30.0  # of one to where others block its push to its place
 _SHOVES = 28.0  # cost of a push that carries other objects along
@@ -126,7 +128,10 @@ class PlacePushes:
         for k, (kept, _) in found.items():
             if not any(push.final for push in kept) and not self._ended(found):
                 kept += self._objects.around(k)
-            if self._scene.thorough and not kept and not self._ended(found):
+            least = min((push.cost for push in kept), default=math.inf)
+            distance = math.dist(scene.poses[k, :2], scene.goal.poses[scene.places[k], :2])
+            far = least > _DETOUR * distance + _MORE * scene.size
+            if far and not self._ended(found):
                 kept += self._objects.by_several(k)
         for k, (kept, blocked) in found.items():
             if blocked and not kept:
@@ -212,7 +217,7 @@ class PlacePushes:
                 rest = AGAIN * size
                 if scene.places[k] >= 0:
                     found = self._objects.next(k, self._objects.following(k, there))
-                    if found is None:
+                    if found is None or (found[0] and not scene.thorough):
                         continue
                     rest += found[1] + found[0] * _NO_RETURN * size
                 shape = scene.shape_at(k, there)
