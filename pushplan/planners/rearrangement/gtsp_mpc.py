@@ -64,8 +64,8 @@ class GtspMpc(RearrangementPolicy):
         overrides: fields of the default config to change, in place of ``config``.
 
     With a goal of `ObjectGoals` objects are brought to places of their own (docs/gtsp-mpc.md). Of
-    the settings ``grip``, ``mpc``, ``order``, ``response`` and the noise count then, and the
-    attributes below stay empty.
+    the settings ``grip``, ``mpc``, ``order``, ``response`` and the noise count then; ``given_up``
+    and ``graph`` stay empty.
 
     Attributes:
         given_up: why nothing more is tried with an object, by id.
@@ -148,7 +148,10 @@ class GtspMpc(RearrangementPolicy):
 
     def _act(self, world: World) -> Twist:
         if isinstance(world.goal, ObjectGoals):
-            return self._placer.command(world, self._clock.held)
+            twist = self._placer.command(world, self._clock.held)
+            self.plan = self._placer.plan
+            self.current_plan = self._placer.current_plan
+            return twist
         scene = self._observe(world)
         if not scene.left:
             self._execution = None

@@ -142,7 +142,7 @@ class PushHistory:
         self.relocations.clear()
 
 
-def push_plan(world: World, route: Legs | None, push: Push) -> Plan:
+def push_plan(world: World, route: Legs | FloatArray | None, push: Push) -> Plan:
     """The route to a push and the push itself, at full speed and turn rate.
 
     A push is predicted at its end only: in between, ``object_poses`` follow the straight line from
@@ -151,11 +151,11 @@ def push_plan(world: World, route: Legs | None, push: Push) -> Plan:
 
     Args:
         world: the snapshot from which the robot starts, with the objects that the push knows.
-        route: to the start of the push; None if the robot is there.
+        route: to the start of the push, as legs or (N, 3) poses; None if the robot is there.
         push: the push.
     """
     robot = world.robot
-    approach = _route_poses(world, route)
+    approach = route if isinstance(route, np.ndarray) else _route_poses(world, route)
     poses = np.concatenate([approach, push.poses])
     along = arc_lengths(poses)
     first = len(approach)

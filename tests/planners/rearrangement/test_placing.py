@@ -327,3 +327,25 @@ def test_unknown_orders_are_refused() -> None:
         RearrangementConfig(order="farthest")
     with pytest.raises(InvalidInputError, match="grip"):
         RearrangementConfig(grip=0.0)
+
+
+@pytest.mark.parametrize("robot", [PUSHER, racecar()])
+def test_the_plan_is_what_is_driven(robot: Any) -> None:
+    world = scene_of(
+        [(0.0, 0.0, 0.0), (0.0, 0.8, 0.0)],
+        [(0.7, 0.0, 0.0), (0.7, 0.8, 0.0)],
+        robot=robot,
+        side=4.0,
+    )
+    policy = GtspMpc()
+    policy.reset(world, np.random.default_rng(0))
+    assert policy.plan == () and policy.current_plan is None
+    policy.act(world)
+    assert len(policy.plan) == 2 and {push.target for push in policy.plan} == {0, 1}
+    plan = policy.current_plan
+    assert plan is not None
+    assert plan.poses[0] == pytest.approx(world.robot_pose)
+    assert plan.poses[-1] == pytest.approx(policy.plan[0].poses[-1])
+    assert plan.subtasks[0].object_ids == (policy.plan[0].target,)
+    moved = plan.object_poses[-1] - world.movables.poses
+    assert np.flatnonzero(np.hypot(*moved[:, :2].T) > 0.1).tolist() == [policy.plan[0].target]

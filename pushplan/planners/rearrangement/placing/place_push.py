@@ -7,8 +7,12 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+import numpy as np
+
 from pushplan.planners.rearrangement.placing.contact import Contact
 from pushplan.planners.rearrangement.placing.placing_scene import PlacingScene
+from pushplan.planners.rearrangement.push import Push
+from pushplan.world import World
 from pushplan.world.checks import FloatArray
 
 _FAILED = 3.5  # cost of a push for each time that it has failed [circumscribed radii]
@@ -86,6 +90,23 @@ class PlacePush:
     def object_pose(self) -> FloatArray:
         """(3,) the object after the push."""
         return self.contact.object_at(self.poses[-1])
+
+    def predicted(self, world: World) -> Push:
+        """The same as a push of a plan, in a world in which its object may be elsewhere by now."""
+        mine = world.movables.ids == self.label
+        ends = np.where(mine[:, None], self.object_pose, world.movables.poses)
+        work = float(world.movables.masses[mine].sum()) * self.length
+        return Push(
+            delivers=(self.label,) if self.final else (),
+            target=self.label,
+            controller="arc",
+            poses=self.poses,
+            length=self.length,
+            work=work,
+            cost=self.cost,
+            object_poses=ends,
+            relocates=not self.final,
+        )
 
 
 @dataclass

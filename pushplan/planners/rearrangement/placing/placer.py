@@ -12,8 +12,9 @@ from pushplan.planners.rearrangement.placing.place_order import PlaceChoice, fir
 from pushplan.planners.rearrangement.placing.place_push import PlacingHistory
 from pushplan.planners.rearrangement.placing.place_pushes import PlacePushes
 from pushplan.planners.rearrangement.placing.placing_scene import PlacingScene
+from pushplan.planners.rearrangement.push import Push, push_plan
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
-from pushplan.world import PendingResult, PlanningExecutor, Stop, Twist, World
+from pushplan.world import PendingResult, Plan, PlanningExecutor, Stop, Twist, World
 from pushplan.world.checks import FloatArray
 
 _MOST_ENDS = 3  # pushes and recoveries that may end in one step until the robot waits
@@ -32,6 +33,10 @@ class Placer:
         config: settings.
         stop: stop rule of each decision.
         rng: of a random order.
+
+    Attributes:
+        plan: the pushes planned last, in order.
+        current_plan: the push in hand, with the way to it; None while there is none.
     """
 
     def __init__(
@@ -51,6 +56,8 @@ class Placer:
         self._grip = config.grip
         self._recovery: Recovery | None = None
         self._retreats = 0
+        self.plan: tuple[Push, ...] = ()
+        self.current_plan: Plan | None = None
 
     def command(self, world: World, held: float) -> Twist:
         """The velocity to drive now.
@@ -104,6 +111,7 @@ class Placer:
             return self._recovery is not None
         self._wait = _WAIT
         if not isinstance(choice, PlaceChoice):
+            self.plan = ()
             self._to_goal = Transit(world.robot, choice, self.config)
             return True
         push = choice.push
@@ -111,6 +119,8 @@ class Placer:
             if push.favours is not None:
                 self._history.waits[push.label] = push.favours
             self._execution = PlaceExecution(choice, world.robot, self.config, self._grip)
+            self.plan = tuple(each.predicted(world) for each in choice.order)
+            self.current_plan = push_plan(world, choice.way, self.plan[0])
         return True
 
     def _give_up(self, world: World) -> None:
@@ -148,6 +158,7 @@ class Placer:
     def _close(self, world: World, execution: PlaceExecution) -> None:
         """Note what the push has done."""
         self._execution = None
+        self.current_plan = None
         push = execution.push
         missed = not world.completed[world.movables.ids == push.label].all()
         if missed and abs(execution.slip) > _SLIPPED * world.robot.circumscribed_radius:
