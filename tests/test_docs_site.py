@@ -130,15 +130,3 @@ def test_code_blocks_are_python_and_commands_have_their_options(page: Path) -> N
                 program, *arguments = command
                 if program == "pushplan" and not ends:
                     parser.parse_args(arguments)
-
-
-@pytest.mark.release
-@pytest.mark.learn
-def test_the_training_script_of_the_page_on_networks_runs(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    page = (DOCS / "learned.md").read_text("utf-8")
-    (block,) = re.findall(r"^```python\n([^`]*?stable_baselines3.*?)^```$", page, re.M | re.S)
-    exec(compile(block.replace("100_000", "1024"), "learned.md", "exec"), {})
-    assert {path.name for path in tmp_path.iterdir()} == {"model.zip", "model.pushplan.json"}
