@@ -119,7 +119,8 @@ def _cell(lines: Sequence[str], left: bool) -> str:
 
 def _breakable(text: str) -> str:
     """An escaped text with places to break words at that LaTeX cannot hyphenate, such as names."""
-    pieces = ([word] if len(word) <= _LETTERS else textwrap.wrap(word, 8) for word in text.split())
+    whole = re.compile(rf"(?=.{{,{_LETTERS}}}$)[(']?[A-Za-z'-]+[).,;:]*")
+    pieces = ([word] if whole.fullmatch(word) else textwrap.wrap(word, 8) for word in text.split())
     return " ".join(r"\allowbreak{}".join(map(escaped, words)) for words in pieces)
 
 
