@@ -10,7 +10,7 @@ import shlex
 import sys
 from itertools import groupby
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 
 import pytest
 
@@ -60,6 +60,16 @@ def test_every_option_of_the_command_line_has_a_line(site: ModuleType) -> None:
     for command in ("demo", "bench", "plan"):
         assert f"## pushplan {command}\n" in page
     assert "| `--json` |" in page and "| 130 | interrupted" in page
+
+
+def test_the_search_has_entries_for_what_users_look_for(site: ModuleType) -> None:
+    for page, entries in site.SOUGHT.items():
+        source = [(DOCS / f"{page}.md").read_text("utf-8")]
+        site.prepare(SimpleNamespace(srcdir=DOCS), page, source)
+        first, *rest = source[0].splitlines()
+        assert first.startswith("# ")
+        shown = [line for line in rest if line.startswith("```{index} ! ")]
+        assert shown == [f"```{{index}} ! {entry}" for entry in entries]
 
 
 def test_every_page_is_in_the_order_of_the_site() -> None:
@@ -130,15 +140,3 @@ def test_code_blocks_are_python_and_commands_have_their_options(page: Path) -> N
                 program, *arguments = command
                 if program == "pushplan" and not ends:
                     parser.parse_args(arguments)
-
-
-@pytest.mark.release
-@pytest.mark.learn
-def test_the_training_script_of_the_page_on_networks_runs(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    page = (DOCS / "learned.md").read_text("utf-8")
-    (block,) = re.findall(r"^```python\n([^`]*?stable_baselines3.*?)^```$", page, re.M | re.S)
-    exec(compile(block.replace("100_000", "1024"), "learned.md", "exec"), {})
-    assert {path.name for path in tmp_path.iterdir()} == {"model.zip", "model.pushplan.json"}

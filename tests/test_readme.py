@@ -124,12 +124,6 @@ def test_its_deadline_holds() -> None:
     assert {result.status.label for result in results} == {"solved"}
 
 
-def test_the_page_about_tasks_makes_an_environment() -> None:
-    page = (ROOT / "docs" / "tasks.md").read_text("utf-8")
-    (text,) = re.findall(r"^```python\n(import gymnasium.*?)^```$", page, re.MULTILINE | re.DOTALL)
-    exec(text, {"__name__": "__main__"})
-
-
 def test_the_page_about_world_files_shows_the_room() -> None:
     page = (ROOT / "docs" / "world-file.md").read_text("utf-8")
     (shown,) = re.findall(r"```yaml\n(schema.*?)```", page, re.DOTALL)

@@ -161,13 +161,12 @@ def table(wanted: Wanted, episodes: Sequence[StoredEpisode]) -> str:
     """A table with the line above that says where it comes from, as Markdown."""
     chosen = _chosen(wanted, episodes)
     rows = [one.row for one in chosen]
+    note = ""
     if wanted.differences:
-        note = "Paired differences on the same scenarios: mean with its 95 % bootstrap interval."
-    else:
-        note = "Success has Wilson's interval, a mean its bootstrap interval, both of 95 %."
-        if TIMES.keys() & set(wanted.columns):
-            note += " Times are the median over episodes of each one's median, and the longest."
-    above = fill(f"{_origin(wanted, chosen)} {note}", WIDTH, break_on_hyphens=False)
+        note = " Paired differences on the same scenarios: mean with its 95 % bootstrap interval."
+    elif TIMES.keys() & set(wanted.columns):
+        note = " Times are the median over episodes of each one's median, and the longest."
+    above = fill(f"{_origin(wanted, chosen)}{note}", WIDTH, break_on_hyphens=False)
     return f"\n{above}\n\n{markdown(rows, wanted)}\n"  # an empty line ends a table
 
 

@@ -161,8 +161,20 @@ def _options(parser: argparse.ArgumentParser) -> list[str]:
     return lines
 
 
+SOUGHT = {
+    "rl": ("reinforcement learning", "Gymnasium", "Stable-Baselines3", "SB3", "PPO"),
+    "ros2": ("ROS 2", "Nav2"),
+    "cpp": ("C++",),
+    "paper": ("LaTeX",),
+    "extending": ("own planner", "own task", "own robot", "custom planner", "custom task"),
+    "evaluation": ("own worlds",),
+    "world-file": ("goal pose", "places of objects"),
+}
+"""Page -> what the search answers with that page first, whatever else has the words."""
+
+
 def prepare(app: Any, name: str, source: list[str]) -> None:
-    """Show links to what has no page as text, and give tables of scores their class."""
+    """Show links to what has no page as text; add classes of tables and entries of the index."""
     root = Path(app.srcdir) / Path(name).parent
 
     def shown(found: re.Match[str]) -> str:
@@ -171,6 +183,9 @@ def prepare(app: Any, name: str, source: list[str]) -> None:
     if not name.startswith("generated/"):
         source[0] = _LINK_UP.sub(shown, source[0])
         source[0] = _SCORES.sub("{.scores}\n", source[0])
+        title, rest = source[0].split("\n", 1)
+        entries = (f"```{{index}} ! {entry}\n```\n" for entry in SOUGHT.get(name, ()))
+        source[0] = f"{title}\n\n{''.join(entries)}{rest}"
 
 
 def resolve(app: Any, env: Any, node: Element, contnode: Element) -> Element | None:

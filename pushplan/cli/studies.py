@@ -110,7 +110,8 @@ def _run(experiment: Experiment, out: str, options: argparse.Namespace) -> int:
 
     names = ("workers", "retry_failed", "any_version", "shard")
     chosen = {name: getattr(options, name) for name in names}
-    workers = f"{options.workers or 1} workers"
+    count = options.workers or 1
+    workers = f"{count} worker{'s' if count > 1 else ''}"
     if options.dask:
         workers = "a cluster"
     cost = experiment.cost(out, **chosen)

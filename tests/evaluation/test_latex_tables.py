@@ -39,6 +39,13 @@ def tables() -> list[Table]:
     ]
 
 
+def test_notes_are_broken_within_names_and_never_within_words() -> None:
+    text = latex([Table("rooms", ("policy",), (("straight",),), f"{PAIR_NOTE}; {LONG}")])
+    plain, _, name = text.partition("differences hold; ")
+    assert r"\allowbreak" not in plain and "correlation" in plain
+    assert r"\allowbreak{}" in name
+
+
 @pytest.mark.parametrize("step", [11, pytest.param(1, marks=pytest.mark.slow)])
 def test_the_text_is_ascii_and_every_character_is_there(tables: list[Table], step: int) -> None:
     assert latex(tables).isascii()

@@ -19,7 +19,8 @@ from pushplan.serving.episodes import SETTINGS
 from pushplan.serving.messages import REQUESTS
 from pushplan.world import Episode, world_to_dict
 
-PAGE = (Path(__file__).parents[2] / "docs" / "serve.md").read_text("utf-8")
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "serve.md").read_text("utf-8")
 (EXCHANGE,) = re.findall(r"```\n(> .*?)```", PAGE, re.DOTALL)
 LINES = [(line[0], line[2:]) for line in EXCHANGE.splitlines()]
 REQUESTED = [text for who, text in LINES if who == ">"]
@@ -43,9 +44,8 @@ def test_the_exchange_happens_as_it_is_shown(tmp_path):
 
 @pytest.mark.skipif(shutil.which("g++") is None, reason="needs g++")
 def test_the_client_in_another_language_compiles_and_talks(tmp_path):
-    (code,) = re.findall(r"```cpp\n(.*?)```", PAGE, re.DOTALL)
-    (tmp_path / "client.cpp").write_text(code)
-    build = ["g++", "-std=c++17", "-Wall", "-Werror", "client.cpp", "-o", "client"]
+    code = ROOT / "examples" / "cpp" / "serve_client.cpp"
+    build = ["g++", "-std=c++17", "-Wall", "-Werror", code, "-o", "client"]
     subprocess.run(build, cwd=tmp_path, check=True)
     with served("straight", tmp_path) as server:
         done = subprocess.run(

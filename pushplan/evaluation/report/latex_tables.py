@@ -118,9 +118,10 @@ def _cell(lines: Sequence[str], left: bool) -> str:
 
 
 def _breakable(text: str) -> str:
-    """An escaped text with places to break its long words at."""
-    words = (r"\allowbreak{}".join(map(escaped, textwrap.wrap(word, 8))) for word in text.split())
-    return " ".join(words)
+    """An escaped text with places to break words at that LaTeX cannot hyphenate, such as names."""
+    whole = re.compile(rf"(?=.{{,{_LETTERS}}}$)[(']?[A-Za-z'-]+[).,;:]*")
+    pieces = ([word] if whole.fullmatch(word) else textwrap.wrap(word, 8) for word in text.split())
+    return " ".join(r"\allowbreak{}".join(map(escaped, words)) for words in pieces)
 
 
 def escaped(text: str) -> str:

@@ -73,8 +73,8 @@ PAIR_NOTE = (
     "policy has the better or worse value, by the metric's own direction; p is of the signed-rank"
     " test (sign test for success), corrected by Holm over the pairs and settings of a metric; "
     "effect is the rank-biserial correlation, 1 where the second is better every time; * where p "
-    "< 0.05 with 10 scenarios at least; more is how many further scenarios would separate the "
-    "pair, were the differences to go on like this (power 0.8)"
+    "< 0.05 with 10 scenarios at least; more is the number of further scenarios for a power of "
+    "0.8 if the observed differences hold"
 )
 BRIEF_NOTE = (
     "second policy minus first on the same scenarios: mean, 95 % bootstrap interval; * where p < "

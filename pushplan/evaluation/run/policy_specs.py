@@ -215,7 +215,10 @@ def _module_of(thing: Any) -> str:
     return "__main__" if module == "__mp_main__" else module
 
 
-_NO_PLANNER = "{!r} is a policy, not a planner: give it to 'pushplan run' or 'pushplan bench'"
+_NO_PLANNER = (
+    "{!r} is a policy, not a planner: give it to 'pushplan run' or 'pushplan bench', with "
+    "--task room --set world_file=FILE for a world file"
+)
 
 
 @contextlib.contextmanager

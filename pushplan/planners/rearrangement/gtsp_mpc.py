@@ -137,9 +137,11 @@ class GtspMpc(RearrangementPolicy):
         if not isinstance(world.goal, ObjectGoals):
             super()._check(world)
         elif not (world.robot.min_speed < 0.0 and world.robot.drive in _PLACING_DRIVES):
+            drives = ", ".join(drive.value for drive in _PLACING_DRIVES)
             raise InvalidInputError(
-                "pushing objects to places needs a robot that can reverse, with one of the drives "
-                + ", ".join(drive.value for drive in _PLACING_DRIVES)
+                "pushing objects to places needs a robot that can reverse, with min_speed below 0 "
+                f"and one of the drives {drives}; got min_speed {world.robot.min_speed:g} and "
+                f"{world.robot.drive.value}"
             )
         elif self.costs:
             raise InvalidInputError(
