@@ -5,7 +5,7 @@ Usage::
     python docs/pictures.py [NAME ...]
 
 Writes into docs/images: `box-delivery-layouts`, `area-clearing-layouts`, `namo-order`, `rearrange`,
-`mujoco`, `gtsp-mpc`, `push-aware`, `ship-planners`; all of them without a name.
+`film`, `mujoco`, `gtsp-mpc`, `push-aware`, `ship-planners`; all of them without a name.
 `mujoco` needs OpenGL (docs/simulators-mujoco.md).
 """
 
@@ -16,7 +16,14 @@ from pathlib import Path
 
 import numpy as np
 
-from pushplan.drawing import Panel, draw_figure, save_figure, save_image
+from pushplan.drawing import (
+    Panel,
+    draw_figure,
+    draw_world,
+    save_animation,
+    save_figure,
+    save_image,
+)
 from pushplan.drawing.palette import DASHES, SERIES
 from pushplan.envs import PushEnv, RolloutInteraction, make
 from pushplan.envs.simulators.mujoco_simulator import MujocoSimulator
@@ -28,6 +35,9 @@ from pushplan.scenarios import Scenario, suite
 from pushplan.world import GoalDisc, Movables, RobotModel, StaticMap, World, stream
 
 IMAGES = Path(__file__).parent / "images"
+FRAMES = 120  # of a film
+PAUSE = 18  # frames at its end
+FILM_HEIGHT = 360  # [px]
 LAYOUTS = {
     "box_delivery": ("small_empty", "small_columns", "large_columns", "large_divider"),
     "area_clearing": ("clear", "clear_small", "walled", "walled_with_columns"),
@@ -55,6 +65,39 @@ def start_and_end(name: str, first_seed: int, policy: str, file: str) -> None:
     trails = {"trail": episode.robot_poses, "object_trails": episode.object_poses}
     panels = (Panel(episode.world, title="start"), Panel(world, title="end", **trails))
     save_figure(IMAGES / file, draw_figure(*panels, width_in=7.0))
+
+
+def film() -> None:
+    """One robot pushes a box out of a doorway, another clears an area; side by side."""
+    films = []
+    for name, seed, policy in (
+        ("namo-2d-one-box", 1, "namo"),
+        ("area-clearing-2d-10-clear-small", 1, "gtsp-mpc"),
+    ):
+        scenario = suite(name, episodes=1, first_seed=seed).scenarios[0]
+        with make(scenario, action=("velocity", "turn_rate")) as env:
+            episode = run_episode(env, make_policy(policy), scenario)
+        steps = np.linspace(0, len(episode.times) - 1, FRAMES).astype(int)
+        films.append(
+            [
+                draw_world(
+                    episode.world_at(i), trail=episode.robot_poses[: i + 1], size_px=FILM_HEIGHT
+                )
+                for i in (*steps, *[steps[-1]] * PAUSE)
+            ]
+        )
+    save_animation(IMAGES / "pushes.gif", map(_beside, *films), fps=12.0)
+
+
+def _beside(*pictures: np.ndarray) -> np.ndarray:
+    """Pictures in a row, on white."""
+    height = max(picture.shape[0] for picture in pictures)
+    padded = []
+    for picture in pictures:
+        free = height - picture.shape[0]
+        rows = (free // 2, free - free // 2)
+        padded.append(np.pad(picture, (rows, (8, 8), (0, 0)), constant_values=255))
+    return np.concatenate(padded, axis=1)
 
 
 def mujoco() -> None:
@@ -157,6 +200,7 @@ DRAWN = {
     "area-clearing-layouts": lambda: layouts("area_clearing"),
     "namo-order": lambda: start_and_end("namo-2d-order", 1001, "namo", "namo-order.png"),
     "rearrange": lambda: start_and_end("rearrange-2d-3", 1001, "gtsp-mpc", "rearrange.png"),
+    "film": film,
     "mujoco": mujoco,
     "gtsp-mpc": first_pushes,
     "push-aware": door,

@@ -131,5 +131,5 @@ def test_without_torch_the_error_names_the_extra(monkeypatch):
     from pushplan.world import MissingDependencyError
 
     monkeypatch.setitem(sys.modules, "torch", None)
-    with pytest.raises(MissingDependencyError, match="learn"):
+    with pytest.raises(MissingDependencyError, match="train"):
         train(IcePairs(np.zeros((1, 3, 40, 40)), np.zeros((1, 40, 40)), np.zeros(1)))
