@@ -11,7 +11,7 @@ from pushplan.cli.output_files import check_directory
 from pushplan.cli.progress import progress_of
 
 EPISODES = {
-    "maze-2d-3": "kinodynamic-rrt",
+    "namo-2d-one-box": "namo",
     "ship-ice-2d-10": "skeleton",
     "area-clearing-2d-10-clear-small": "greedy",
 }
