@@ -20,7 +20,7 @@ from pushplan.world.polyline import path_length
 
 # All lengths in circumscribed radii.
 LENGTHS = (0.85, 1.8, 3.2, 5.0, 7.5)  # of pushes that do not lead to a place
-AGAIN = 3.5  # cost of one more push
+AGAIN = 1.5  # cost of one more push, besides the drive to it
 PER_OBJECT = 4  # free pushes of an object that are kept
 _LONGEST = 60.0  # push that is looked at
 _LOOKED_AT = 40  # pushes of an object that are checked for them
@@ -247,12 +247,12 @@ class ObjectPushes:
     ) -> PlacePush:
         """The push that the first part of a way is; see `PlacePush` for the rest."""
         scene = self._scene
-        contact = way[0].contact
-        poses = way[0].poses
-        start = scene.backed_off(k, poses[0], contact)
-        end = scene.backed_off(k, poses[-1], contact)
+        starts = [scene.backed_off(k, part.poses[0], part.contact) for part in way]
+        ends = [scene.backed_off(k, part.poses[-1], part.contact) for part in way]
+        for end, start in zip(ends, starts[1:], strict=False):
+            rest += float(scene.drive_costs(end[None], start[None])[0, 0])
         label = int(scene.movables.ids[k])
-        return PlacePush(k, label, way, length, rest, penalty, free, start, end)
+        return PlacePush(k, label, way, length, rest, penalty, free, starts[0], ends[0], ends[-1])
 
     def part(
         self, k: int, contact: Contact, poses: FloatArray

@@ -15,8 +15,6 @@ from pushplan.planners.rearrangement.placing.placing_scene import PlacingScene
 from pushplan.world import MaxIterations
 from pushplan.world.checks import FloatArray
 
-_DETOUR = 1.2  # of a way between pushes, over the straight one
-_TURN = 0.15  # cost of a turn on the spot [circumscribed radii/rad]
 _LATER = 1e3  # cost of beginning with a push that is not free [m]
 _TRIES = 30  # pushes that are tried as the first, until there is a way to one
 _ITERATIONS = 200
@@ -97,16 +95,9 @@ def _tour(
 def _costs(scene: PlacingScene, pushes: list[PlacePush]) -> FloatArray:
     """(N + 1, N) cost [m] of a push after another, or after the robot's pose in the last row."""
     starts = np.array([push.start for push in pushes])
-    ends = np.vstack([[push.end for push in pushes], scene.world.robot_pose])
+    ends = np.vstack([[push.finish for push in pushes], scene.world.robot_pose])
     own = np.array([push.cost for push in pushes])
-    if scene.is_car:
-        drives = scene.drives
-        ways = np.array([[drives.length(end, start) for start in starts] for end in ends])
-        return np.asarray(_DETOUR * ways + own)
-    away = starts[None, :, :] - ends[:, None, :]
-    turns = np.abs(np.remainder(away[..., 2] + math.pi, math.tau) - math.pi)
-    ways = _DETOUR * np.hypot(away[..., 0], away[..., 1]) + _TURN * scene.size * turns
-    return np.asarray(ways + own)
+    return np.asarray(scene.drive_costs(ends, starts) + own)
 
 
 def way_to(scene: PlacingScene, target: FloatArray) -> Legs | FloatArray | None:

@@ -52,6 +52,7 @@ class PlacePush:
         favours: id of the object for which it makes room; None if it does not.
         start: (3,) the robot before contact.
         end: (3,) the robot once it has backed off.
+        finish: (3,) the robot after the last of the pushes that bring the object to its place.
     """
 
     k: int
@@ -63,6 +64,7 @@ class PlacePush:
     free: bool
     start: FloatArray
     end: FloatArray
+    finish: FloatArray
     early: float = 0.0
     favours: int | None = None
 

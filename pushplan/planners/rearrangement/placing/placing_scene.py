@@ -29,6 +29,8 @@ _TURNING_ROOM = 0.09  # between object and a robot that turns in front of it [ci
 _OFF = 0.35  # distance by which a car is off an object before it steers [circumscribed radii]
 _RUN = 1.5  # length of the way on which a car comes to an object or leaves it [radii, the same]
 _RUN_POSES = 8  # that are looked at on it
+_DETOUR = 1.2  # of a drive between pushes, over the straight one or the shortest curve
+_TURN = 0.15  # cost of a turn on the spot [circumscribed radii/rad]
 _STEERING = 1.1  # turning radius that a car plans with, over its least
 
 
@@ -103,6 +105,16 @@ class PlacingScene:
         """Turning of the robot between pushes, if it is a car."""
         radius = _STEERING * self.robot.min_turning_radius
         return Turning(radius, True, _STEP * self.size)
+
+    def drive_costs(self, starts: FloatArray, ends: FloatArray) -> FloatArray:
+        """(N, M) what drives between poses (N, 3) and (M, 3) are thought to cost [m]."""
+        if self.is_car:
+            curves = [[self.drives.length(start, end) for end in ends] for start in starts]
+            return np.asarray(_DETOUR * np.array(curves))
+        away = ends[None, :, :] - starts[:, None, :]
+        turns = np.abs(np.remainder(away[..., 2] + math.pi, math.tau) - math.pi)
+        lengths = np.hypot(away[..., 0], away[..., 1])
+        return np.asarray(_DETOUR * lengths + _TURN * self.size * turns)
 
     def pushes(self, contact: Contact) -> Turning:
         """Turning of robot and object together."""
