@@ -80,7 +80,9 @@ class RearrangeTask(RoomTask):
     def observation(self, name: str) -> ObservationBuilder:
         """The builder of an observation by name; states say where each object belongs."""
         builder = super().observation(name)
-        return replace(builder, places=True) if isinstance(builder, StateObservation) else builder
+        if isinstance(builder, StateObservation):
+            return replace(builder, places=True)
+        return builder
 
     def start(self, rng: np.random.Generator) -> World:
         """A new room, or the next instance of the file."""

@@ -155,7 +155,7 @@ def push_plan(world: World, route: Legs | FloatArray | None, push: Push) -> Plan
         push: the push.
     """
     robot = world.robot
-    approach = route if isinstance(route, np.ndarray) else _route_poses(world, route)
+    approach = _route_poses(world, route)
     poses = np.concatenate([approach, push.poses])
     along = arc_lengths(poses)
     first = len(approach)
@@ -191,8 +191,10 @@ def push_plan(world: World, route: Legs | FloatArray | None, push: Push) -> Plan
     )
 
 
-def _route_poses(world: World, route: Legs | None) -> FloatArray:
+def _route_poses(world: World, route: Legs | FloatArray | None) -> FloatArray:
     """(N, 3) poses before and after each turn on the spot of a route, from where the robot is."""
+    if isinstance(route, np.ndarray):
+        return route
     poses = [np.array(world.robot_pose)]
     if route is not None:
         for point, sign in zip(route.points, route.signs, strict=True):

@@ -124,7 +124,6 @@ class ObjectPushes:
         A best-first search over poses of the object. The last push is the curve to the place.
         """
         scene = self._scene
-        again = AGAIN * scene.size
         numbers = itertools.count()
         heap: list[_Node] = [(0.0, next(numbers), 0.0, scene.poses[k], (), False)]
         seen = set()
@@ -141,7 +140,8 @@ class ObjectPushes:
                 continue
             seen.add(cell)
             expanded += 1
-            for contact in (scene.contacts if way else scene.first_contacts)[k]:
+            contacts = scene.contacts if way else scene.first_contacts
+            for contact in contacts[k]:
                 if not way and math.isinf(self._history.cost(scene, k, contact, False)):
                     continue
                 start = contact.robot_at(here)
@@ -155,11 +155,14 @@ class ObjectPushes:
                     if found is None or not found[0]:
                         continue
                     there = contact.object_at(target)
-                    curves = () if last else self.following(k, there)
-                    if not last and not curves:
-                        continue
-                    known = cost + length + (0.0 if last else again)
-                    bound = known + (0.0 if last else curves[0].length)
+                    known = cost + length
+                    bound = known
+                    if not last:
+                        curves = self.following(k, there)
+                        if not curves:
+                            continue
+                        known += AGAIN * scene.size
+                        bound = known + curves[0].length
                     node = bound, next(numbers), known, there, (*way, *found[1]), last
                     heapq.heappush(heap, node)
         return []
