@@ -70,8 +70,9 @@ class PlacePushes:
         offered = self._offered()
         self._waiting = []
         pushes = []
+        ranked = {k: sorted(own, key=lambda push: push.cost) for k, own in offered.items()}
         for k, own in offered.items():
-            others = [theirs for j, theirs in offered.items() if j != k]
+            others = [theirs for j, theirs in ranked.items() if j != k]
             at_place = self._hindrance(k, scene.goal.poses[scene.places[k]], others)
             mine = []
             for push in own:
@@ -94,8 +95,15 @@ class PlacePushes:
         moves: dict[int, list[PlacePush]] = {}
         found = []
         for pushes in self._blocked.values():
-            rooms = [self._room_for(push, moves) for push in pushes]
-            found += next((room for room, enough in rooms if enough), rooms[0][0])
+            rooms = []
+            for push in pushes:
+                room, enough = self._room_for(push, moves)
+                rooms.append(room)
+                if enough:
+                    found += room
+                    break
+            else:
+                found += rooms[0]
         return found
 
     def shoves(self) -> list[PlacePush]:
@@ -141,20 +149,24 @@ class PlacePushes:
 
     def _ended(self, found: _Found) -> bool:
         """True if the stop rule has ended the search, and a free push is known."""
-        costs = [push.cost for kept, _ in found.values() for push in kept]
-        if self._check is None or not costs:
+        if self._check is None:
             return False
-        return self._check(self._objects.count, min(costs))
+        least = min((push.cost for kept, _ in found.values() for push in kept), default=math.inf)
+        return math.isfinite(least) and self._check(self._objects.count, least)
 
     def _hindrance(self, k: int, pose: FloatArray, others: list[list[PlacePush]]) -> float:
-        """By how much more the other objects cost once object ``k`` is at a pose (3,) [m]."""
+        """By how much more the other objects cost once object ``k`` is at a pose (3,) [m].
+
+        Args:
+            k: index of the object.
+            pose: (3,).
+            others: the pushes of each other object, the cheapest first.
+        """
         most = _IN_THE_WAY * self._scene.size
         total = 0.0
         for pushes in others:
-            ranked = sorted(pushes, key=lambda push: push.cost)
-            least = ranked[0].cost
-            clear = (push.cost for push in ranked if self._is_clear_of(push, k, pose))
-            total += min(next(clear, math.inf) - least, most)
+            clear = (push.cost for push in pushes if self._is_clear_of(push, k, pose))
+            total += min(next(clear, math.inf) - pushes[0].cost, most)
         return total
 
     def _is_clear_of(self, push: PlacePush, k: int, pose: FloatArray) -> bool:
