@@ -32,10 +32,10 @@ NB_MODULE(_core, module) {
   pushplan::bindings::bind_envs(envs);
   auto gtsp = module.def_submodule("gtsp", "Parts of the GTSP solver.");
   pushplan::bindings::bind_gtsp(gtsp);
-  auto learned = module.def_submodule("learned", "What learned policies observe.");
-  pushplan::bindings::bind_learned(learned);
   auto observation = module.def_submodule("observation", "Worlds drawn into images.");
   pushplan::bindings::bind_observation(observation);
+  auto perception = module.def_submodule("perception", "Rays of sensors, and maps of scans.");
+  pushplan::bindings::bind_perception(perception);
   auto planners = module.def_submodule("planners", "Searches and tables of planners.");
   pushplan::bindings::bind_planners(planners);
   auto pushing = module.def_submodule("pushing", "Predictive pushing of one box along a path.");

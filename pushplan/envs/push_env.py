@@ -20,7 +20,7 @@ from pushplan.envs.rendering import Renderer
 from pushplan.envs.simulators.base import Simulator
 from pushplan.envs.tasks.base import StepOutcome, Task
 from pushplan.envs.trace import Trace
-from pushplan.imports.on_demand import look_up
+from pushplan.imports.on_demand import look_up, need
 from pushplan.observation import ObservationBuilder
 from pushplan.world import (
     Action,
@@ -118,6 +118,7 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
             seed = integer("seed", seed, low=0)
         self._first_seed = seed
         self._world: World | None = None
+        self._sensing: Any = None  # a `SimulatedSensing` where not everything is seen
         self._trace: Trace | None = None
         self._over = "reset() has not been called"
         self.observation_space: Any = _space(self._builder, self.task.reach)
@@ -157,12 +158,15 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
 
     @property
     def world(self) -> World:
-        """A snapshot of the scene now, as far as a policy is told (`Task.told`).
+        """A snapshot of the scene now, as far as a policy is told (`Task.told`) and has seen.
 
         Raises:
             EpisodeOverError: before the first `reset`.
         """
-        return self.task.told(self.true_world)
+        if self._sensing is None:
+            return self.task.told(self.true_world)
+        world: World = self._sensing.world
+        return world
 
     @property
     def true_world(self) -> World:
@@ -223,6 +227,11 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         )
         self._over = ""
         self._renderer.show(world)
+        self._sensing = None
+        if self.task.variations.sensing != "full":
+            told = self.task.told(world)
+            sensing = need("pushplan.envs.sensing").SimulatedSensing
+            self._sensing = sensing(self.task.variations, told, stream(layout, "sensing"))
         info = _info(StepOutcome(0.0, False, "", False, False), 0.0, False)
         if world.goal_kind == "objects":
             info["completed"] = np.zeros(len(world.movables), dtype=bool)
@@ -335,8 +344,11 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         return period * max(most, math.floor(clear / period + 1e-9))
 
     def _observe(self, world: World) -> NDArray[Any]:
+        if self._sensing is not None:
+            self._sensing.look(self.task.told(world), self._meanwhile)
         began = time.perf_counter()
-        observation = self._builder.observe(self.task.told(world))
+        scans = getattr(self._builder, "is_sensor", False)
+        observation = self._builder.observe(world if scans else self.world)
         self.observation_time_s = time.perf_counter() - began
         return observation
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pushplan.core import geometry
-from pushplan.core import learned as core
+from pushplan.core import perception as core
 from pushplan.geometry import GoalDistances, goal_distances
 from pushplan.observation.builder import LimitedVector
 from pushplan.world import Goal, GoalDisc, GoalLine, StaticMap, World

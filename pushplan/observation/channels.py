@@ -128,6 +128,15 @@ def heading_line(image: Image, view: View) -> None:
     draw_ray(image, col, row, next_col - col, next_row - row, 255)
 
 
+def unseen(image: Image, view: View) -> None:
+    """Draw where nobody has looked yet, 255; nothing in a world that is seen as a whole."""
+    hidden = view.world.unseen
+    if hidden is not None:
+        values = frozen(np.where(hidden.cells, np.uint8(255), np.uint8(0)))
+        x, y = hidden.origin.tolist()
+        core.sample(image, view.numbers, values, x, y, hidden.resolution)
+
+
 CHANNELS: dict[str, Callable[[Image, View], None]] = {
     "footprint": footprint,
     "movable": movable,
@@ -136,6 +145,7 @@ CHANNELS: dict[str, Callable[[Image, View], None]] = {
     "goal_distance": goal_distance,
     "robot_distance": robot_distance,
     "heading_line": heading_line,
+    "unseen": unseen,
 }
 """Name -> function that writes a channel into a zeroed (H, W) uint8 image."""
 

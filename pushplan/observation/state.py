@@ -68,7 +68,7 @@ class StateObservation(LimitedVector, CheckedFields):
             rows = np.arange(len(keep))
         out = np.zeros(self.shape)
         out[:4] = x, y, c, s
-        out[4:6] = (_goal_point(world) - world.robot_pose[:2]) @ to_body
+        out[4:6] = (goal_point(world) - world.robot_pose[:2]) @ to_body
         out[_OWN:].reshape(-1, _EACH * (1 + self.places))[rows] = columns
         return np.clip(out, self.low, self.high).astype(np.float32)
 
@@ -96,7 +96,8 @@ def _places(world: World, to_body: FloatArray) -> FloatArray:
     return out
 
 
-def _goal_point(world: World) -> FloatArray:
+def goal_point(world: World) -> FloatArray:
+    """The place (2,) [m] that stands for the goal of a world in observations."""
     goal = world.goal
     if isinstance(goal, GoalDisc):
         return goal.center

@@ -64,6 +64,7 @@ from pushplan.world.stored.robots import (
     turtlebot3_burger,
 )
 from pushplan.world.stored.world_files import load_world, save_world, world_from_dict, world_to_dict
+from pushplan.world.unseen import Unseen
 
 __all__ = [
     "BUMPERS",
@@ -119,6 +120,7 @@ __all__ = [
     "SubTask",
     "Twist",
     "UnknownNameError",
+    "Unseen",
     "WheelSpeeds",
     "World",
     "area_clearing_robot",

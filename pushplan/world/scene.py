@@ -25,6 +25,7 @@ from pushplan.world.outline import transform
 from pushplan.world.price_map import PriceMap
 from pushplan.world.robot import RobotModel
 from pushplan.world.static_map import StaticMap
+from pushplan.world.unseen import Unseen
 
 Triple = Annotated[FloatArray, Shape(3)]
 
@@ -46,6 +47,7 @@ class World(ArrayRecord, CheckedFields):
         margin: distance that the robot keeps from what is static where it can [m]. A robot that
             is nearer may drive on and away; see `pushplan.motion.keep_out`.
         price: places that cost more to drive through. Files and logs leave it out.
+        unseen: where nobody has looked yet; None where all is seen. Files and logs leave it out.
 
     Raises:
         InvalidInputError: if a member has the wrong type or shape or is not finite.
@@ -62,6 +64,7 @@ class World(ArrayRecord, CheckedFields):
     time: float = 0.0
     margin: NonNegativeFloat = 0.0
     price: PriceMap | None = None
+    unseen: Unseen | None = None
 
     def __post_init__(self) -> None:
         if self.robot_twist is None:

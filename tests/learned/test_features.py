@@ -7,7 +7,7 @@ from conftest import make_u_maze
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pushplan.core import learned as core
+from pushplan.core import perception as core
 from pushplan.envs import PushEnv
 from pushplan.learned import FeatureObservation
 from pushplan.world import InvalidInputError

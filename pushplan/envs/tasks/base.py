@@ -13,6 +13,7 @@ import numpy as np
 from pushplan.envs.simulators.base import Materials
 from pushplan.envs.tasks.presets import SOLIDS, Preset
 from pushplan.envs.tasks.variations import TaskVariations
+from pushplan.imports.on_demand import need
 from pushplan.observation import ObservationBuilder, StateObservation
 from pushplan.world import (
     Drive,
@@ -292,8 +293,14 @@ class Task(ABC):
         Raises:
             UnknownNameError: if the task has no such observation.
         """
+        if name == "lidar":
+            builder: ObservationBuilder = need("pushplan.perception.lidar_observation").builder_for(
+                self.robot, self.variations.view_range
+            )
+            return builder
         if name not in self.observations:
-            raise UnknownNameError(f"observation of task {self.name!r}", name, self.observations)
+            valid = (*self.observations, "lidar")
+            raise UnknownNameError(f"observation of task {self.name!r}", name, valid)
         if name == "state":
             return StateObservation(max_objects=self.state_objects)
         return self._image(name)

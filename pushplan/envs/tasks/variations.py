@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Annotated, Any, ClassVar, Self
@@ -66,6 +67,20 @@ class TaskVariations(CheckedFields):
     # what a policy is told of masses and limit surfaces: the truth, or what they would be without
     # scale and spreads
     parameters: Annotated[str, OneOf(("known", "unknown"))] = "known"
+    # what a policy gets to see: everything, of the objects only what has been in view, or of what
+    # is static, too, only what a lidar has seen (`pushplan.envs.sensing`)
+    sensing: Annotated[str, OneOf(("full", "objects", "lidar"))] = "full"
+    # how far sensors see [m]; 30 times the robot's circumscribed radius if None
+    view_range: PositiveFloat | None = None
+    # angle that they see, half of it to each side of the heading [rad]
+    view_angle: Annotated[float, Limits(0.0, math.tau, open_low=True)] = math.tau
+    range_noise: NonNegativeFloat = 0.0  # standard deviation of the distances of the lidar [m]
+    object_noise: NonNegativeFloat = 0.0  # of x and y of the objects that are detected [m]
+    turn_noise: NonNegativeFloat = 0.0  # of their headings [rad]
+    drop_out: Fraction = 0.0  # fraction of the beams and of the objects in view that are missing
+    view_rate: PositiveFloat | None = None  # scans a second at most [Hz]; one each step if None
+    view_delay: NonNegativeFloat = 0.0  # from a scan until it is there [s]
+    unknown_price: NonNegativeFloat = 0.0  # of a metre where nobody has looked, in metres
 
     task: ClassVar[str] = "this task"
     """Name of the task."""

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from pushplan.perception.movability import Movability
 from pushplan.planners.following.plan_follower import PlanFollower
-from pushplan.planners.namo.movability import Movability
 from pushplan.planners.namo.planner import Namo
 from pushplan.world import Planner, Stop, Twist, World
 
@@ -31,7 +31,7 @@ class NamoFollower(PlanFollower):
 
     def reset(self, world: World, rng: np.random.Generator) -> None:
         """Forget the last episode."""
-        self.movability = Movability(world)
+        self.movability = Movability(world.robot)
         super().reset(world, rng)
 
     def act(self, world: World, observation: Any = None) -> Twist:

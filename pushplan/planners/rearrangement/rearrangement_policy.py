@@ -10,6 +10,7 @@ import numpy as np
 
 from pushplan.control import EpisodeClock
 from pushplan.planners.arguments import check_pusher
+from pushplan.planners.rearrangement.look_around import LookAround
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.world import Twist, World
 from pushplan.world.checks import expect
@@ -40,7 +41,15 @@ class RearrangementPolicy(ABC):
             InvalidInputError: if the goal is one for the robot, or the robot cannot stop.
         """
         self._check(world)  # before the clock takes the snapshot
-        return self._clock.command_for(world, self._act)
+        return self._clock.command_for(world, self._act_or_look)
+
+    def _act_or_look(self, world: World) -> Twist:
+        """The velocity for an instant; looks around where no object is known that is left."""
+        if world.unseen is not None and self._recovery is None and world.completed.all():
+            twist = self._look_around.command(world)
+            if twist is not None:
+                return twist
+        return self._act(world)
 
     def _check(self, world: World) -> None:
         """Refuse a world that nothing can be done with."""
@@ -49,6 +58,7 @@ class RearrangementPolicy(ABC):
     def _forget(self) -> None:
         """Begin an episode."""
         self._clock = EpisodeClock(self.config.response)
+        self._look_around = LookAround()
         self._recovery: Callable[[World, float], Twist | None] | None = None
 
     def _recover(self, world: World) -> Twist | None:

@@ -16,8 +16,8 @@ from pushplan.evaluation import JobSettings, run_episode
 from pushplan.interaction import QuasiStatic
 from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.keyholes import KeyholeConfig, KeyholeSearch
+from pushplan.perception.movability import Movability
 from pushplan.planners import make_planner, make_policy
-from pushplan.planners.namo.movability import Movability
 from pushplan.scenarios import suite, suite_names
 from pushplan.world import (
     Cancellation,
@@ -160,7 +160,7 @@ def test_what_stops_the_robot_is_believed_fixed_until_it_moves() -> None:
     world, _ = start("one_box")
     box = world.movables.poses[0]
     there = world.moved(robot_pose=[box[0] - 0.5 - 0.7, box[1], 0.0])
-    movability = Movability(there)
+    movability = Movability(there.robot)
     believed = there
     for step in range(8):
         believed = movability.update(there.moved(time=float(step)))
@@ -172,7 +172,7 @@ def test_what_stops_the_robot_is_believed_fixed_until_it_moves() -> None:
 
 def test_what_was_told_is_dropped_where_nothing_else_is_left() -> None:
     world = start("one_box")[0].believing([True])
-    movability = Movability(world)
+    movability = Movability(world.robot)
     assert movability.update(world).movables.fixed.all()
     movability.drop_prior()
     assert movability.update(world).movables.fixed.all()  # the same instant

@@ -8,8 +8,8 @@ import numpy as np
 
 from pushplan.control import StallChecker
 from pushplan.geometry import convex_distance
-from pushplan.world import Twist, World
-from pushplan.world.checks import FloatArray
+from pushplan.world import RobotModel, Twist, World
+from pushplan.world.checks import FloatArray, IntArray
 
 _TOUCH = 0.05  # gap at which the robot touches an object [circumscribed radii]
 _MOVED = 0.05  # motion that proves that an object can be moved [circumscribed radii]
@@ -24,13 +24,13 @@ class Movability:
     an object that has been seen to move can be moved.
 
     Args:
-        world: the start of the episode.
+        robot: that pushes.
     """
 
-    def __init__(self, world: World) -> None:
-        self._size = world.robot.circumscribed_radius
+    def __init__(self, robot: RobotModel) -> None:
+        self._size = robot.circumscribed_radius
         self._first: dict[int, FloatArray] = {}
-        self._stall = StallChecker(world.robot, _PATIENCE)
+        self._stall = StallChecker(robot, _PATIENCE)
         self._ahead = False
         self._has_prior = True
         self._believed: tuple[float, set[int]] | None = None
@@ -67,6 +67,14 @@ class Movability:
         """Take the command that is driven until the next update."""
         self._ahead = command.linear > 0.0
         self._stall.send(command)
+
+    def known(self, ids: IntArray) -> list[str]:
+        """Of each object with ids (K,): ``"movable"``, ``"fixed"``, or ``"unknown"`` by now."""
+        found = []
+        for number in ids.tolist():
+            state = "fixed" if number in self.stopped_by else "unknown"
+            found.append("movable" if number in self.seen_moving else state)
+        return found
 
     def drop_prior(self) -> None:
         """Stop believing what was told, where nothing else is left to try."""

@@ -4,7 +4,7 @@
 #include <numbers>
 
 #include "check.hpp"
-#include "pushplan/learned/rays.hpp"
+#include "pushplan/perception/rays.hpp"
 #include "shapes.hpp"
 
 namespace pushplan {

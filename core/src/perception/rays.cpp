@@ -1,4 +1,4 @@
-#include "pushplan/learned/rays.hpp"
+#include "pushplan/perception/rays.hpp"
 
 #include <algorithm>
 #include <cmath>

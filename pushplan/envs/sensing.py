@@ -1,0 +1,84 @@
+"""`SimulatedSensing`: what a robot in a simulator has seen so far, as a world."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+import numpy as np
+
+from pushplan.envs.tasks.variations import TaskVariations
+from pushplan.perception import Detections, Detector, Lidar, LidarScan, WorldEstimate
+from pushplan.world import Twist, World
+
+_FAR = 30.0  # default range of the sensors [circumscribed radii]
+
+
+class SimulatedSensing:
+    """A lidar and a detector on the robot, and the estimate that comes of them.
+
+    The robot knows its own pose, the goal and the bounds of the map; with ``sensing: objects`` the
+    walls too. A detector says nothing of which objects can be moved.
+
+    Args:
+        variations: of the task: what is seen, how far, and with what noise.
+        world: the scene at the start of an episode, which is looked at.
+        rng: of all noise.
+
+    Attributes:
+        world: what the robot knows now.
+    """
+
+    def __init__(self, variations: TaskVariations, world: World, rng: np.random.Generator) -> None:
+        far = variations.view_range or _FAR * world.robot.circumscribed_radius
+        angle = variations.view_angle
+        self._lidar = Lidar(
+            field_of_view=angle,
+            range=far,
+            noise=variations.range_noise,
+            drop_out=variations.drop_out,
+        )
+        self._detector = Detector(
+            field_of_view=angle,
+            range=far,
+            position_noise=variations.object_noise,
+            heading_noise=variations.turn_noise,
+            miss=variations.drop_out,
+        )
+        self._interval = 0.0 if variations.view_rate is None else 1.0 / variations.view_rate
+        self._delay = variations.view_delay
+        self._rng = rng
+        self._estimate = WorldEstimate(
+            world.robot,
+            world.goal,
+            world.static.bounds,
+            known=world.static if variations.sensing == "objects" else None,
+            unknown_price=variations.unknown_price,
+            margin=world.margin,
+        )
+        self._inbox: deque[tuple[float, LidarScan, Detections]] = deque()
+        self._seen_at = -math.inf
+        self._take_in(self._lidar.scan(world, rng), self._detector.detect(world, rng))
+        self.look(world)
+
+    def look(self, world: World, driven: Twist | None = None) -> None:
+        """Look at the scene as it is now, and bring `world` up to date.
+
+        Args:
+            world: the scene.
+            driven: what the robot was told to drive since the last look; nothing by default.
+        """
+        now = world.time
+        if now >= self._seen_at + self._interval - 1e-9:
+            self._seen_at = now
+            scan = self._lidar.scan(world, self._rng)
+            detections = self._detector.detect(world, self._rng)
+            self._inbox.append((now + self._delay, scan, detections))
+        while self._inbox and self._inbox[0][0] <= now + 1e-9:
+            self._take_in(*self._inbox.popleft()[1:])
+        self._estimate.sent(driven or Twist(0.0, 0.0))
+        self.world = self._estimate.world(world.robot_pose, world.robot_twist, now)
+
+    def _take_in(self, scan: LidarScan, detections: Detections) -> None:
+        self._estimate.add_detections(detections)
+        self._estimate.add_scan(scan)

@@ -1,0 +1,120 @@
+"""`ScanMap`: log-odds of the cells of a scene, from laser scans."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import shapely
+
+from pushplan.core import perception as core
+from pushplan.perception.lidar import LidarScan
+from pushplan.world import InvalidInputError, StaticMap
+from pushplan.world.checks import BoolArray, FloatArray, checked_bounds, frozen, number
+from pushplan.world.occupancy_grid import rectangle_cover
+
+_EVIDENCE = (1.5, -0.4, -2.0, 4.5)  # log-odds of a hit and of a miss, and their limits
+_TILE = 32  # cells along the side of a part of the map whose rectangles are found anew together
+_MOST_CELLS = 25_000_000
+
+
+class ScanMap:
+    """Occupancy grid (Moravec and Elfes 1985) whose occupied cells become a `StaticMap`.
+
+    A beam is taken to end half a cell behind what it has hit, so that surfaces are as often drawn
+    too near as too far.
+
+    Args:
+        bounds: (4,) x_min, y_min, x_max, y_max of the map [m].
+        cell: side of a cell [m].
+
+    Attributes:
+        log_odds: (rows, columns) of being occupied; 0 where nobody has looked.
+
+    Raises:
+        InvalidInputError: if the bounds are empty, or hold more than 25 million cells.
+    """
+
+    def __init__(self, bounds: FloatArray, cell: float) -> None:
+        self.bounds = checked_bounds("bounds", bounds)
+        self.cell = number("cell", cell, low=0.0, open_low=True)
+        extent = self.bounds[2:] - self.bounds[:2]
+        columns, rows = (math.ceil(side / self.cell - 1e-9) for side in extent.tolist())
+        if rows * columns > _MOST_CELLS:
+            raise InvalidInputError(
+                f"a map may have at most {_MOST_CELLS:,} cells, {rows:,} x {columns:,} are too "
+                "many: use larger cells"
+            )
+        self.log_odds = np.zeros((rows, columns))
+        self._solid = np.zeros((rows, columns), dtype=np.bool_)
+        self._tiles: dict[tuple[int, int], list[FloatArray]] = {}
+        self._static = _plain_map((), self.bounds)
+
+    @property
+    def unseen(self) -> BoolArray:
+        """(rows, columns) cells at which nobody has looked."""
+        hidden: BoolArray = self.log_odds == 0.0
+        return hidden
+
+    def add(self, scan: LidarScan, ignored: BoolArray) -> None:
+        """Mark a scan.
+
+        Args:
+            scan: what the sensor saw.
+            ignored: (N,) beams that have hit something that belongs to no map.
+        """
+        hit = np.isfinite(scan.ranges)
+        passed = np.where(np.isnan(scan.ranges), 0.0, np.minimum(scan.ranges, scan.reach))
+        ends = np.where(hit & ~ignored, scan.ranges + 0.5 * self.cell, np.inf)
+        left, low = self.bounds[:2].tolist()
+        x, y, heading = scan.pose.tolist()
+        bearings = frozen(heading + scan.bearings)
+        core.mark_scan(self.log_odds, left, low, self.cell, x, y, bearings, passed, ends, _EVIDENCE)
+
+    def clear(self, shape: shapely.Geometry) -> None:
+        """Hold the cells in a polygon for free, where they are held for occupied."""
+        box = (np.array(shapely.bounds(shape)).reshape(2, 2) - self.bounds[:2]) / self.cell
+        (c0, r0), (c1, r1) = np.clip([box[0], box[1] + 1.0], 0, self.log_odds.shape[::-1]).astype(
+            int
+        )
+        part = self.log_odds[r0:r1, c0:c1]
+        if not (part > 0.0).any():
+            return
+        rows, columns = np.nonzero(part > 0.0)
+        x, y = self.bounds[:2, None] + self.cell * (np.array([columns + c0, rows + r0]) + 0.5)
+        inside = shapely.contains_xy(shape, x, y)
+        part[rows[inside], columns[inside]] = _EVIDENCE[1]
+
+    def static_map(self, *, unknown: str = "free") -> StaticMap:
+        """What is occupied, as rectangles; the same map where nothing has changed.
+
+        Args:
+            unknown: ``"free"`` or ``"obstacle"``, what cells count as that nobody has seen.
+        """
+        solid = self.log_odds > 0.0
+        if unknown == "obstacle":
+            solid |= self.unseen
+        rows, columns = np.nonzero(solid != self._solid)
+        if not len(rows):
+            return self._static
+        for tile in set(zip((rows // _TILE).tolist(), (columns // _TILE).tolist(), strict=True)):
+            self._tiles[tile] = self._rectangles(solid, *tile)
+        self._solid = solid
+        polygons = [one for tile in sorted(self._tiles) for one in self._tiles[tile]]
+        self._static = _plain_map(tuple(polygons), self.bounds)
+        return self._static
+
+    def _rectangles(self, solid: BoolArray, row: int, column: int) -> list[FloatArray]:
+        """Polygons (4, 2) [m] that cover the occupied cells of a tile."""
+        corner = _TILE * np.array([row, column])
+        part = solid[corner[0] : corner[0] + _TILE, corner[1] : corner[1] + _TILE]
+        r0, c0, r1, c1 = (rectangle_cover(part) + np.tile(corner, 2)).T
+        points = np.stack([c0, r0, c1, r0, c1, r1, c0, r1], axis=1).reshape(-1, 4, 2)
+        return [frozen(one) for one in self.bounds[:2] + self.cell * points]
+
+
+def _plain_map(polygons: tuple[FloatArray, ...], bounds: FloatArray) -> StaticMap:
+    """A map of convex polygons that need no check."""
+    static = StaticMap.build(bounds=bounds)
+    object.__setattr__(static, "polygons", polygons)
+    return static
