@@ -2,9 +2,11 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 #include "check.hpp"
 #include "pushplan/perception/rays.hpp"
+#include "pushplan/perception/scan_marking.hpp"
 #include "shapes.hpp"
 
 namespace pushplan {
@@ -63,11 +65,36 @@ void rays_are_as_short_as_their_crossings() {
   }
 }
 
+/// A beam clears the cells that it passes and ends in one; what is beside that one stays as it is.
+void scans_clear_and_fill_cells() {
+  for (const double x : {4.5, 5.0}) {  // in a cell, and between two of them
+    for (const double bearing : {0.0, std::numbers::pi}) {
+      std::vector<double> values(10 * 3, 0.0);
+      const LogOdds map{{values.data(), {3, 10}}, {0.0, 0.0}, 1.0};
+      const std::array<double, 1> bearings{bearing};
+      const std::array<double, 1> passed{3.2};
+      mark_scan(map, {x, 1.5}, bearings, passed, passed, {1.5, -0.4, -2.0, 4.5});
+      const double sign = bearing == 0.0 ? 1.0 : -1.0;
+      const auto end = static_cast<Index>(std::floor(x + 3.2 * sign));
+      CHECK(map.values(1, end) == 1.5);
+      const auto first = static_cast<Index>(std::floor(x + 0.1 * sign));
+      for (Index column = 0; column < 10; ++column) {
+        CHECK(map.values(0, column) == 0.0);
+        const Index along = sign > 0.0 ? column - first : first - column;
+        const Index last = sign > 0.0 ? end - first : first - end;
+        const bool free = 0 <= along && along < last - 1;
+        if (column != end) CHECK(map.values(1, column) == (free ? -0.4 : 0.0));
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace pushplan
 
 int main() {
   pushplan::rays_end_on_outlines();
   pushplan::rays_are_as_short_as_their_crossings();
+  pushplan::scans_clear_and_fill_cells();
   return pushplan::tests::finish();
 }

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import shapely
+from numpy.typing import ArrayLike
 
 from pushplan.core import perception as core
 from pushplan.perception.lidar import LidarScan
@@ -25,20 +26,24 @@ class ScanMap:
     too near as too far.
 
     Args:
-        bounds: (4,) x_min, y_min, x_max, y_max of the map [m].
+        bounds: (4,) x_min, y_min, x_max, y_max of the scene [m].
         cell: side of a cell [m].
+        rim: how far the map goes on beyond the bounds, where walls may stand [m].
 
     Attributes:
+        origin: (2,) x, y [m] of the outer corner of cell (0, 0).
         log_odds: (rows, columns) of being occupied; 0 where nobody has looked.
 
     Raises:
         InvalidInputError: if the bounds are empty, or hold more than 25 million cells.
     """
 
-    def __init__(self, bounds: FloatArray, cell: float) -> None:
-        self.bounds = checked_bounds("bounds", bounds)
+    def __init__(self, bounds: ArrayLike, cell: float, rim: float = 0.0) -> None:
+        self._bounds = checked_bounds("bounds", bounds)
         self.cell = number("cell", cell, low=0.0, open_low=True)
-        extent = self.bounds[2:] - self.bounds[:2]
+        rim = number("rim", rim, low=0.0)
+        self.origin = frozen(self._bounds[:2] - rim)
+        extent = self._bounds[2:] - self._bounds[:2] + 2.0 * rim
         columns, rows = (math.ceil(side / self.cell - 1e-9) for side in extent.tolist())
         if rows * columns > _MOST_CELLS:
             raise InvalidInputError(
@@ -48,7 +53,7 @@ class ScanMap:
         self.log_odds = np.zeros((rows, columns))
         self._solid = np.zeros((rows, columns), dtype=np.bool_)
         self._tiles: dict[tuple[int, int], list[FloatArray]] = {}
-        self._static = _plain_map((), self.bounds)
+        self._static = _plain_map((), self._bounds)
 
     @property
     def unseen(self) -> BoolArray:
@@ -66,14 +71,14 @@ class ScanMap:
         hit = np.isfinite(scan.ranges)
         passed = np.where(np.isnan(scan.ranges), 0.0, np.minimum(scan.ranges, scan.reach))
         ends = np.where(hit & ~ignored, scan.ranges + 0.5 * self.cell, np.inf)
-        left, low = self.bounds[:2].tolist()
+        left, low = self.origin.tolist()
         x, y, heading = scan.pose.tolist()
         bearings = frozen(heading + scan.bearings)
         core.mark_scan(self.log_odds, left, low, self.cell, x, y, bearings, passed, ends, _EVIDENCE)
 
     def clear(self, shape: shapely.Geometry) -> None:
         """Hold the cells in a polygon for free, where they are held for occupied."""
-        box = (np.array(shapely.bounds(shape)).reshape(2, 2) - self.bounds[:2]) / self.cell
+        box = (np.array(shapely.bounds(shape)).reshape(2, 2) - self.origin) / self.cell
         (c0, r0), (c1, r1) = np.clip([box[0], box[1] + 1.0], 0, self.log_odds.shape[::-1]).astype(
             int
         )
@@ -81,7 +86,7 @@ class ScanMap:
         if not (part > 0.0).any():
             return
         rows, columns = np.nonzero(part > 0.0)
-        x, y = self.bounds[:2, None] + self.cell * (np.array([columns + c0, rows + r0]) + 0.5)
+        x, y = self.origin[:, None] + self.cell * (np.array([columns + c0, rows + r0]) + 0.5)
         inside = shapely.contains_xy(shape, x, y)
         part[rows[inside], columns[inside]] = _EVIDENCE[1]
 
@@ -101,7 +106,7 @@ class ScanMap:
             self._tiles[tile] = self._rectangles(solid, *tile)
         self._solid = solid
         polygons = [one for tile in sorted(self._tiles) for one in self._tiles[tile]]
-        self._static = _plain_map(tuple(polygons), self.bounds)
+        self._static = _plain_map(tuple(polygons), self._bounds)
         return self._static
 
     def _rectangles(self, solid: BoolArray, row: int, column: int) -> list[FloatArray]:
@@ -110,7 +115,7 @@ class ScanMap:
         part = solid[corner[0] : corner[0] + _TILE, corner[1] : corner[1] + _TILE]
         r0, c0, r1, c1 = (rectangle_cover(part) + np.tile(corner, 2)).T
         points = np.stack([c0, r0, c1, r0, c1, r1, c0, r1], axis=1).reshape(-1, 4, 2)
-        return [frozen(one) for one in self.bounds[:2] + self.cell * points]
+        return [frozen(one) for one in self.origin + self.cell * points]
 
 
 def _plain_map(polygons: tuple[FloatArray, ...], bounds: FloatArray) -> StaticMap:

@@ -77,7 +77,7 @@ class WorldEstimate:
         self._drift = number("drift", drift, low=0.0)
         self._margin = number("margin", margin, low=0.0)
         cell = robot.inscribed_radius / _CELLS if cell is None else cell
-        self.map = ScanMap(np.asarray(bounds, dtype=np.float64), cell)
+        self.map = ScanMap(bounds, cell, robot.circumscribed_radius)
         self.objects = Movables.empty()
         self.movability = Movability(robot)
         self._seen_at: dict[int, float] = {}
@@ -164,7 +164,7 @@ class WorldEstimate:
         if static is None:
             static = self.map.static_map(unknown=self._unknown)
         cells = self.map.unseen
-        origin = self.map.bounds[:2]
+        origin = self.map.origin
         price = None
         if self._unknown_price > 0.0:
             price = PriceMap(

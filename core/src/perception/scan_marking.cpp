@@ -52,8 +52,8 @@ struct Walk {
   double interval;  // between two borders
 
   Walk(double start, double direction)
-      : at(floor_index(start)), step(direction < 0.0 ? -1 : 1),
-        interval(1.0 / std::max(std::abs(direction), 1e-300)) {
+      : at(direction < 0.0 ? ceil_index(start) - 1 : floor_index(start)),
+        step(direction < 0.0 ? -1 : 1), interval(1.0 / std::max(std::abs(direction), 1e-300)) {
     const double inside = start - static_cast<double>(at);
     next = interval * (direction < 0.0 ? inside : 1.0 - inside);
   }

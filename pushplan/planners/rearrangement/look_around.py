@@ -88,6 +88,8 @@ def _hiding_places(world: World) -> FloatArray | None:
     room = ndimage.distance_transform_edt(np.pad(cells, 1))[1:-1, 1:-1]
     cells = unseen.resolution * room > _HIDES * world.robot.inscribed_radius
     points = unseen.centres(cells)
+    area = shapely.box(*world.static.bounds)
     if isinstance(world.goal, ClearanceArea):
-        points = points[shapely.contains_xy(shapely.Polygon(world.goal.polygon), points)]
+        area = shapely.Polygon(world.goal.polygon)
+    points = points[shapely.contains_xy(area, points)]
     return points if len(points) else None

@@ -1,0 +1,257 @@
+"""Sensors against scenes whose visible parts are known, and the map and world made of them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import make_robot
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pushplan.perception import Detections, Detector, Lidar, LidarScan, ScanMap, WorldEstimate
+from pushplan.world import GoalDisc, InvalidInputError, Movables, StaticMap, Twist, World
+
+BOX = np.array([(-0.2, -0.2), (0.2, -0.2), (0.2, 0.2), (-0.2, 0.2)])
+ROBOT = make_robot(min_speed=-1.0)
+GOAL = GoalDisc(np.array([3.0, 3.0]), 0.3)
+HALL = (-4.0, -3.0, 4.0, 3.0)
+
+
+def wall(x0: float, y0: float, x1: float, y1: float) -> list[tuple[float, float]]:
+    return [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
+
+
+def hall(boxes=(), walls=(), at=(0.0, 0.0, 0.0), time: float = 0.0) -> World:
+    """A hall of 8 x 6 m with its robot, boxes of 0.4 m and some walls."""
+    x0, y0, x1, y1 = HALL
+    around = [
+        wall(x0 - 0.2, y0, x0, y1),
+        wall(x1, y0, x1 + 0.2, y1),
+        wall(x0, y0 - 0.2, x1, y0),
+        wall(x0, y1, x1, y1 + 0.2),
+    ]
+    static = StaticMap.build(polygons=[*around, *walls], bounds=HALL)
+    poses = np.array(boxes, dtype=float).reshape(-1, 3)
+    objects = Movables.from_outlines([BOX] * len(poses), poses)
+    return World(ROBOT, np.array(at, dtype=float), static, objects, GOAL, time=time)
+
+
+def to_walls(points: np.ndarray) -> np.ndarray:
+    """(N,) distances of points (N, 2) to the nearest wall around the hall [m]."""
+    return np.abs(np.abs(points) - [4.0, 3.0]).min(axis=1)
+
+
+def estimate(**options) -> WorldEstimate:
+    return WorldEstimate(ROBOT, GOAL, HALL, cell=0.05, **options)
+
+
+def look(belief: WorldEstimate, world: World, lidar=None, detector=None) -> World:
+    """Take in what is seen of a world without noise."""
+    belief.add_detections((detector or Detector()).detect(world))
+    belief.add_scan((lidar or Lidar()).scan(world))
+    return belief.world(world.robot_pose, world.robot_twist, world.time)
+
+
+class TestLidar:
+    @given(st.floats(-3.5, 3.5), st.floats(-2.5, 2.5), st.floats(-4.0, 4.0))
+    @settings(max_examples=30, deadline=None)
+    def test_ranges_in_an_empty_hall_end_on_its_walls(self, x, y, heading):
+        scan = Lidar(beams=90, range=20.0).scan(hall(at=(x, y, heading)))
+        angles = heading + scan.bearings
+        with np.errstate(divide="ignore"):
+            across = (4.0 - np.sign(np.cos(angles)) * x) / np.abs(np.cos(angles))
+            along = (3.0 - np.sign(np.sin(angles)) * y) / np.abs(np.sin(angles))
+        np.testing.assert_allclose(scan.ranges, np.minimum(across, along), rtol=1e-6)
+        on_wall = np.minimum(
+            np.abs(np.abs(scan.points[:, 0]) - 4.0), np.abs(np.abs(scan.points[:, 1]) - 3.0)
+        )
+        assert on_wall.max() < 1e-6
+
+    def test_objects_are_hit_and_what_is_out_of_range_is_infinite(self):
+        scan = Lidar(beams=4, range=3.5).scan(hall([(2.0, 0.0, 0.0)]))
+        np.testing.assert_allclose(scan.ranges, [1.8, 3.0, np.inf, 3.0])
+
+    def test_a_field_of_view_is_ahead(self):
+        scan = Lidar(beams=360, field_of_view=math.pi).scan(hall())
+        assert len(scan.bearings) == 181 and np.abs(scan.bearings).max() <= math.pi / 2 + 1e-9
+
+    def test_noise_and_drop_outs_are_as_large_as_asked_for(self):
+        lidar = Lidar(beams=20_000, range=20.0, noise=0.03, drop_out=0.2)
+        exact = Lidar(beams=20_000, range=20.0).scan(hall())
+        scan = lidar.scan(hall(), np.random.default_rng(0))
+        lost = np.isnan(scan.ranges)
+        assert lost.mean() == pytest.approx(0.2, abs=0.01)
+        assert np.std(scan.ranges[~lost] - exact.ranges[~lost]) == pytest.approx(0.03, rel=0.05)
+
+    @pytest.mark.parametrize(
+        ("options", "said"),
+        [
+            ({"beams": 2}, "beams must be in"),
+            ({"range": math.nan}, "range must"),
+            ({"range": 0.0}, "range must"),
+            ({"noise": -1.0}, "noise must"),
+            ({"drop_out": 1.5}, "drop_out must"),
+            ({"field_of_view": 7.0}, "field_of_view must"),
+        ],
+    )
+    def test_bad_settings_are_refused(self, options, said):
+        with pytest.raises(InvalidInputError, match=said):
+            Lidar(**options)
+
+    def test_a_scan_with_too_few_ranges_is_refused(self):
+        with pytest.raises(InvalidInputError, match="ranges must be 2 distances"):
+            LidarScan(0.0, np.zeros(3), np.zeros(2), np.ones(3), 5.0)
+
+
+class TestDetector:
+    def test_what_stands_behind_a_wall_or_a_box_is_not_seen(self):
+        boxes = [(1.5, 0.0, 0.0), (3.0, 0.0, 0.0), (-2.0, 0.0, 0.0), (0.0, 2.0, 0.5)]
+        world = hall(boxes, [wall(-1.5, -1.0, -1.3, 1.0)])
+        visible = Detector().visible(world)
+        np.testing.assert_allclose(visible[[0, 3]], 1.0)
+        assert visible[1] == visible[2] == 0.0
+        assert Detector().detect(world).objects.ids.tolist() == [0, 3]
+
+    def test_range_and_field_of_view(self):
+        world = hall([(1.5, 0.0, 0.0), (-1.5, 0.0, 0.0), (3.0, 1.0, 0.0)])
+        assert Detector(field_of_view=math.pi).detect(world).objects.ids.tolist() == [0, 2]
+        assert Detector(range=2.0).detect(world).objects.ids.tolist() == [0, 1]
+
+    def test_half_a_box_is_half_visible(self):
+        world = hall([(3.0, 0.0, 0.0)], [wall(1.0, 0.0, 1.2, 2.5)])
+        assert Detector().visible(world)[0] == pytest.approx(0.5, abs=0.1)
+        assert len(Detector(least_visible=0.7).detect(world).objects) == 0
+        assert len(Detector(least_visible=0.3).detect(world).objects) == 1
+
+    def test_it_says_nothing_of_what_can_be_moved(self):
+        world = hall([(1.5, 0.0, 0.0)]).believing([True])
+        assert not Detector().detect(world).objects.fixed.any()
+
+
+class TestScanMap:
+    def test_walls_are_where_they_are(self):
+        chart = ScanMap(HALL, 0.05, 0.3)
+        column = wall(1.0, -0.3, 1.6, 0.3)
+        for at in ((-2.0, 1.0, 0.0), (2.5, -1.0, 0.0), (2.0, 2.0, 0.0)):
+            scan = Lidar().scan(hall(walls=[column], at=at))
+            chart.add(scan, np.zeros(len(scan.bearings), dtype=bool))
+        static = chart.static_map()
+        corners = static.packed[0]
+        on_walls = (
+            np.minimum(4.0 - np.abs(corners[:, 0]), 3.0 - np.abs(corners[:, 1])) <= 0.05 + 1e-9
+        )
+        on_column = (np.abs(corners - [1.3, 0.0]) <= 0.3 + 0.05 + 1e-9).all(axis=1)
+        assert (on_walls | on_column).all() and on_column.any() and on_walls.any()
+        assert chart.static_map() is static
+
+    def test_what_is_behind_something_is_unseen(self):
+        chart = ScanMap(HALL, 0.1)
+        scan = Lidar().scan(hall(walls=[wall(1.0, -3.0, 1.2, 3.0)]))
+        chart.add(scan, np.zeros(len(scan.bearings), dtype=bool))
+        unseen = chart.unseen
+        assert unseen[:, 54:].all() and not unseen[5:-5, 5:48].any()
+        solid = chart.static_map(unknown="obstacle")
+        assert sum(len(part) for part in solid.polygons) > sum(
+            len(part) for part in chart.static_map().polygons
+        )
+
+    def test_too_many_cells_are_refused(self):
+        with pytest.raises(InvalidInputError, match="use larger cells"):
+            ScanMap(HALL, 1e-4)
+
+
+class TestWorldEstimate:
+    def test_an_object_behind_another_is_remembered(self):
+        belief = estimate()
+        seen = look(belief, hall([(1.0, 1.5, 0.3)]))
+        hides = [wall(0.3, 0.5, 0.5, 2.9)]
+        later = look(belief, hall([(1.0, 1.5, 0.3)], hides, time=4.0))
+        np.testing.assert_array_equal(later.movables.poses, seen.movables.poses)
+        assert belief.unseen_s.tolist() == [4.0]
+        assert belief.deviations[0] == pytest.approx(0.04)
+
+    def test_an_object_is_forgotten_when_its_place_is_seen_to_be_empty(self):
+        belief = estimate()
+        assert len(look(belief, hall([(1.0, 1.5, 0.3)])).movables) == 1
+        assert len(look(belief, hall(time=1.0)).movables) == 0
+
+    def test_objects_are_no_walls(self):
+        world = look(estimate(), hall([(1.5, 0.4, 0.4), (-2.0, 0.0, 0.0)]))
+        corners = world.static.packed[0]
+        assert (to_walls(corners) < 0.2).all() and len(corners) > 4
+
+    def test_an_object_that_was_taken_for_a_wall_is_one_no_more(self):
+        belief = estimate()
+        there = hall([(2.0, 0.0, 0.0)])
+        blind = Detector(least_visible=1.0, range=0.5)
+        assert (look(belief, there, detector=blind).static.packed[0][:, 0] < 2.0).any()
+        world = look(belief, replace(there, time=1.0))
+        near = np.abs(world.static.packed[0] - [2.0, 0.0]).max(axis=1) < 0.3
+        assert not near.any() and len(world.movables) == 1
+
+    def test_a_known_map_stays_and_prices_are_of_what_is_unseen(self):
+        there = hall([(1.5, 0.0, 0.0)])
+        belief = estimate(known=there.static, unknown_price=2.0)
+        world = look(belief, there, Lidar(range=1.0), Detector(range=1.0))
+        assert world.static is there.static and len(world.movables) == 0
+        assert world.price is not None and world.unseen is not None
+        assert set(np.unique(world.price.prices)) == {0.0, 2.0}
+        np.testing.assert_array_equal(world.price.prices > 0.0, world.unseen.cells)
+
+    def test_an_object_that_stops_the_robot_is_held_fixed_until_it_moves(self):
+        belief = estimate()
+        front = ROBOT.vertices[:, 0].max()
+        at = (front + 0.2, 0.0, 0.0)
+        for time in np.arange(0.0, 4.0, 0.2).tolist():
+            belief.sent(Twist(1.0, 0.0))
+            world = look(belief, hall([at], time=time))
+        assert world.movables.fixed.tolist() == [True]
+        assert belief.movability.known(world.movables.ids) == ["fixed"]
+        moved = (front + 0.6, 0.0, 0.0)
+        world = look(belief, hall([moved], time=9.0))
+        assert world.movables.fixed.tolist() == [False]
+        assert belief.movability.known(world.movables.ids) == ["movable"]
+
+    def test_detections_that_come_late_change_nothing(self):
+        belief = estimate()
+        look(belief, hall([(1.0, 0.0, 0.0)], time=2.0))
+        old = Detector().detect(hall([(2.0, 0.0, 0.0)], time=1.0))
+        belief.add_detections(old)
+        assert belief.objects.poses[0, 0] == 1.0
+
+    def test_noise_moves_walls_little(self):
+        belief = estimate()
+        rng = np.random.default_rng(1)
+        for time in range(20):
+            there = hall([(1.5, 0.0, 0.0)], at=(-2.0 + 0.1 * time, 0.5, 0.1 * time), time=time)
+            detector = Detector(position_noise=0.01, heading_noise=0.02, miss=0.2)
+            belief.add_detections(detector.detect(there, rng))
+            belief.add_scan(Lidar(noise=0.02, drop_out=0.2).scan(there, rng))
+        world = belief.world(there.robot_pose, None, there.time)
+        corners = world.static.packed[0]
+        assert np.quantile(to_walls(corners), 0.98) < 0.2
+        assert np.abs(world.movables.poses[0, :2] - [1.5, 0.0]).max() < 0.05
+
+    @pytest.mark.parametrize(
+        ("options", "said"),
+        [
+            ({"unknown": "full"}, "unknown treatment of unknown cells 'full'"),
+            ({"unknown_price": -1.0}, "unknown_price must"),
+            ({"drift": math.inf}, "drift must"),
+            ({"cell": 0.0}, "cell must"),
+        ],
+    )
+    def test_bad_settings_are_refused(self, options, said):
+        with pytest.raises(InvalidInputError, match=said):
+            WorldEstimate(ROBOT, GOAL, HALL, **{"cell": 0.05, **options})
+
+    def test_no_reading_changes_nothing(self):
+        belief = estimate()
+        nothing = Movables.empty()
+        belief.add_detections(Detections(0.0, nothing))
+        belief.add_scan(LidarScan(0.0, np.zeros(3), np.zeros(0), np.zeros(0), 5.0))
+        world = belief.world((0.0, 0.0, 0.0), None, 0.0)
+        assert world.static.is_empty and world.unseen is not None and world.unseen.cells.all()
