@@ -54,7 +54,7 @@ class SimulatedSensing:
             world.static.bounds,
             known=world.static if variations.sensing == "objects" else None,
             unknown_price=variations.unknown_price,
-            margin=world.margin,
+            margin=world.margin or None,
         )
         self._inbox: deque[tuple[float, LidarScan, Detections]] = deque()
         self._seen_at = -math.inf

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from pushplan.core import perception as core
 from pushplan.perception.lidar import LidarScan
@@ -15,7 +16,8 @@ from pushplan.world.checks import BoolArray, FloatArray, checked_bounds, frozen,
 from pushplan.world.occupancy_grid import rectangle_cover
 
 _EVIDENCE = (1.5, -0.4, -2.0, 4.5)  # log-odds of a hit and of a miss, and their limits
-_TILE = 32  # cells along the side of a part of the map whose rectangles are found anew together
+_GONE = -1.0  # log-odds below which an occupied cell is free again
+_TILE = 16  # cells along the side of a part of the map whose rectangles are found anew together
 _MOST_CELLS = 25_000_000
 
 
@@ -51,7 +53,7 @@ class ScanMap:
                 "many: use larger cells"
             )
         self.log_odds = np.zeros((rows, columns))
-        self._solid = np.zeros((rows, columns), dtype=np.bool_)
+        self._occupied = self._solid = np.zeros((rows, columns), dtype=np.bool_)
         self._tiles: dict[tuple[int, int], list[FloatArray]] = {}
         self._static = _plain_map((), self._bounds)
 
@@ -76,19 +78,19 @@ class ScanMap:
         bearings = frozen(heading + scan.bearings)
         core.mark_scan(self.log_odds, left, low, self.cell, x, y, bearings, passed, ends, _EVIDENCE)
 
-    def clear(self, shape: shapely.Geometry) -> None:
-        """Hold the cells in a polygon for free, where they are held for occupied."""
-        box = (np.array(shapely.bounds(shape)).reshape(2, 2) - self.origin) / self.cell
-        (c0, r0), (c1, r1) = np.clip([box[0], box[1] + 1.0], 0, self.log_odds.shape[::-1]).astype(
-            int
-        )
-        part = self.log_odds[r0:r1, c0:c1]
-        if not (part > 0.0).any():
-            return
-        rows, columns = np.nonzero(part > 0.0)
-        x, y = self.origin[:, None] + self.cell * (np.array([columns + c0, rows + r0]) + 0.5)
-        inside = shapely.contains_xy(shape, x, y)
-        part[rows[inside], columns[inside]] = _EVIDENCE[1]
+    def clear(self, shapes: NDArray[Any]) -> None:
+        """Hold the cells in polygons of Shapely (K,) for free, where they are held for occupied."""
+        corners = (shapely.bounds(shapes).reshape(-1, 2, 2) - self.origin) / self.cell
+        corners[:, 1] += 1.0
+        boxes = np.clip(corners, 0.0, self.log_odds.shape[::-1]).astype(np.int64).reshape(-1, 4)
+        for shape, (c0, r0, c1, r1) in zip(shapes.tolist(), boxes.tolist(), strict=True):
+            part = self.log_odds[r0:r1, c0:c1]
+            if not (part > 0.0).any():
+                continue
+            rows, columns = np.nonzero(part > 0.0)
+            x, y = self.origin[:, None] + self.cell * (np.array([columns + c0, rows + r0]) + 0.5)
+            inside = shapely.contains_xy(shape, x, y)
+            part[rows[inside], columns[inside]] = _EVIDENCE[2]
 
     def static_map(self, *, unknown: str = "free") -> StaticMap:
         """What is occupied, as rectangles; the same map where nothing has changed.
@@ -96,12 +98,15 @@ class ScanMap:
         Args:
             unknown: ``"free"`` or ``"obstacle"``, what cells count as that nobody has seen.
         """
-        solid = self.log_odds > 0.0
+        stays = self._occupied & (self.log_odds > _GONE)
+        self._occupied = (self.log_odds > 0.0) | stays
+        solid = self._occupied
         if unknown == "obstacle":
-            solid |= self.unseen
-        rows, columns = np.nonzero(solid != self._solid)
-        if not len(rows):
+            solid = solid | self.unseen
+        changed = np.flatnonzero(solid != self._solid)
+        if not len(changed):
             return self._static
+        rows, columns = np.divmod(changed, solid.shape[1])
         for tile in set(zip((rows // _TILE).tolist(), (columns // _TILE).tolist(), strict=True)):
             self._tiles[tile] = self._rectangles(solid, *tile)
         self._solid = solid

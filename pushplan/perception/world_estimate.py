@@ -16,11 +16,11 @@ from pushplan.perception.scan_map import ScanMap
 from pushplan.world import Goal, Movables, PriceMap, RobotModel, StaticMap, Twist, World
 from pushplan.world.checks import FloatArray, choice, number
 from pushplan.world.occupancy_grid import UNKNOWN
-from pushplan.world.outline import transform
 from pushplan.world.unseen import Unseen
 
 _CELLS = 8.0  # to the inscribed radius of the robot
 _RIM = 1.5  # cells around an object in which a beam is taken to have hit the object
+_INEXACT = 0.75  # cells by which a wall may stand nearer than the map has it
 _BEHIND = 2.0  # cells behind a place in an object that a beam has to reach: then it is gone
 
 
@@ -40,7 +40,8 @@ class WorldEstimate:
         unknown: ``"free"`` or ``"obstacle"``, what counts where nobody has looked.
         unknown_price: price of a metre where nobody has looked, see `pushplan.world.PriceMap`.
         drift: by how much the place of an object becomes uncertain that is not seen [m/√s].
-        margin: distance that plans keep from what is static [m].
+        margin: distance that plans keep from what is static [m]; if None three quarters of a cell,
+            by which a wall may stand nearer than the map has it, or 0 with a known map.
 
     Attributes:
         map: log-odds of what scans have hit.
@@ -67,7 +68,7 @@ class WorldEstimate:
         unknown: str = "free",
         unknown_price: float = 0.0,
         drift: float = 0.02,
-        margin: float = 0.0,
+        margin: float | None = None,
     ) -> None:
         self._robot = robot
         self._goal = goal
@@ -75,9 +76,11 @@ class WorldEstimate:
         self._unknown = choice("treatment of unknown cells", unknown, UNKNOWN)
         self._unknown_price = number("unknown_price", unknown_price, low=0.0)
         self._drift = number("drift", drift, low=0.0)
-        self._margin = number("margin", margin, low=0.0)
         cell = robot.inscribed_radius / _CELLS if cell is None else cell
         self.map = ScanMap(bounds, cell, robot.circumscribed_radius)
+        if margin is None:
+            margin = _INEXACT * self.map.cell if known is None else 0.0
+        self._margin = number("margin", margin, low=0.0)
         self.objects = Movables.empty()
         self.movability = Movability(robot)
         self._seen_at: dict[int, float] = {}
@@ -105,8 +108,7 @@ class WorldEstimate:
         self._time = max(self._time, time)
         self.objects = self.objects.updated(seen)
         if self._known is None:
-            for shape in shapely.buffer(_polygons(seen), 0.5 * self.map.cell).tolist():
-                self.map.clear(shape)
+            self.map.clear(shapely.buffer(_polygons(seen), 0.5 * self.map.cell))
 
     def add_scan(self, scan: LidarScan) -> None:
         """Take a laser scan."""
@@ -124,24 +126,17 @@ class WorldEstimate:
     def _forget(self, scan: LidarScan) -> None:
         """Drop the objects through whose place the scan sees."""
         ids = self.objects.ids
-        old = np.array([self._seen_at[label] < scan.time for label in ids.tolist()])
+        old = np.array([self._seen_at[label] < scan.time for label in ids.tolist()], dtype=np.bool_)
         if not len(scan.bearings) or not old.any():
             return
-        firsts = [self.objects.parts(k)[0].mean(axis=0) for k in range(len(ids))]
-        poses = self.objects.poses
-        offset = np.array(
-            [transform(pose, at[None])[0] for pose, at in zip(poses, firsts, strict=True)]
-        )
-        offset -= scan.pose[:2]
-        away = np.hypot(*offset.T)  # to a place that is inside the object
-        turn = np.arctan2(offset[:, 1], offset[:, 0]) - scan.pose[2]
-        off = np.remainder(turn[:, None] - scan.bearings + np.pi, 2.0 * np.pi) - np.pi
-        beam = np.abs(off).argmin(axis=1)
-        step = 4.0 * np.pi / max(len(scan.bearings), 2)
-        met = np.abs(off[np.arange(len(ids)), beam]) < step
+        places = _inner_places(self.objects.select(old)) - scan.pose[:2]
+        away = np.hypot(*places.T)
+        turn = np.arctan2(places[:, 1], places[:, 0]) - scan.pose[2]
+        off = np.abs(np.remainder(turn[:, None] - scan.bearings + np.pi, 2.0 * np.pi) - np.pi)
+        beam = off.argmin(axis=1)
+        met = off.min(axis=1) < 4.0 * np.pi / max(len(scan.bearings), 2)
         ranges = np.nan_to_num(scan.ranges[beam], nan=0.0, posinf=scan.reach)
-        through = ranges > away + _BEHIND * self.map.cell
-        gone = ids[old & met & through]
+        gone = ids[old][met & (ranges > away + _BEHIND * self.map.cell)]
         if len(gone):
             self.objects = self.objects.updated(Movables.empty(), gone)
 
@@ -183,6 +178,15 @@ class WorldEstimate:
             Unseen(cells, self.map.cell, origin),
         )
         return self.movability.update(world)
+
+
+def _inner_places(objects: Movables) -> FloatArray:
+    """(K, 2) places [m] that are inside the objects: in the middle of their first parts."""
+    firsts = np.searchsorted(objects.part_owners, np.arange(len(objects)))
+    corners, starts = object_outlines(objects)
+    sums = np.add.reduceat(corners, starts[:-1], axis=0)
+    middles: FloatArray = (sums / np.diff(starts)[:, None])[firsts]
+    return middles
 
 
 def _polygons(objects: Movables) -> NDArray[Any]:

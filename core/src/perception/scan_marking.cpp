@@ -12,16 +12,15 @@ namespace {
 /// A cell beside one that is hit stays as it is: beams that graze a wall pass its cells.
 enum class Mark : std::uint8_t { none, passed, beside, hit };
 
-/// Marks of one scan in the box that its beams reach.
+/// Marks of one scan.
 class Marks {
  public:
   explicit Marks(const LogOdds& map)
-      : map_(map), marks_(static_cast<std::size_t>(map.values.size()), Mark::none) {}
+      : map_(map), marks_(static_cast<std::size_t>(map.values.size()), Mark::none) {
+    cells_.reserve(marks_.size());
+  }
 
-  void put(Index row, Index column, Mark mark) {
-    const Index columns = map_.values.extent(1);
-    if (row < 0 || column < 0 || row >= map_.values.extent(0) || column >= columns) return;
-    const Index cell = row * columns + column;
+  void put(Index cell, Mark mark) {
     Mark& old = marks_[static_cast<std::size_t>(cell)];
     if (old == Mark::none) cells_.push_back(cell);
     old = std::max(old, mark);
@@ -44,11 +43,11 @@ class Marks {
   std::vector<Index> cells_;
 };
 
-/// Cells along a ray, one after another (Amanatides and Woo 1987).
+/// Rows or columns along a ray, one after another (Amanatides and Woo 1987).
 struct Walk {
-  Index at;         // row or column
+  Index at;
   Index step;
-  double next;      // way to the border of the next cell, in cells
+  double next;      // way to the border of the next one, in cells
   double interval;  // between two borders
 
   Walk(double start, double direction)
@@ -62,6 +61,8 @@ struct Walk {
     at += step;
     next += interval;
   }
+
+  bool is_in(Index count) const { return 0 <= at && at < count; }
 };
 
 }  // namespace
@@ -70,6 +71,8 @@ void mark_scan(const LogOdds& map, const Vec2& from, std::span<const double> bea
                std::span<const double> passed, std::span<const double> hits,
                const ScanEvidence& evidence) {
   Marks marks(map);
+  const Index rows = map.values.extent(0);
+  const Index columns = map.values.extent(1);
   const double x = (from.x - map.corner.x) / map.side;
   const double y = (from.y - map.corner.y) / map.side;
   for (std::size_t beam = 0; beam < bearings.size(); ++beam) {
@@ -77,19 +80,20 @@ void mark_scan(const LogOdds& map, const Vec2& from, std::span<const double> bea
     const double end = passed[beam] / map.side;
     Walk column(x, along.x);
     Walk row(y, along.y);
-    for (double way = 0.0; way < end; way = std::min(column.next, row.next)) {
-      if (way > 0.0) (column.next < row.next ? column : row).advance();
-      marks.put(row.at, column.at, Mark::passed);
-      if (std::min(column.next, row.next) <= way) break;  // no number is that exact any more
+    for (double way = 0.0; way < end && column.is_in(columns) && row.is_in(rows);) {
+      marks.put(row.at * columns + column.at, Mark::passed);
+      way = std::min(column.next, row.next);
+      (column.next < row.next ? column : row).advance();
     }
-    if (std::isfinite(hits[beam])) {
-      const double away = hits[beam] / map.side;
-      const Index at_row = floor_index(y + away * along.y);
-      const Index at_column = floor_index(x + away * along.x);
-      for (Index i = -1; i <= 1; ++i) {
-        for (Index j = -1; j <= 1; ++j) {
-          marks.put(at_row + i, at_column + j, i == 0 && j == 0 ? Mark::hit : Mark::beside);
-        }
+    if (!std::isfinite(hits[beam])) continue;
+    const double away = hits[beam] / map.side;
+    const Index hit_row = floor_index(y + away * along.y);
+    const Index hit_column = floor_index(x + away * along.x);
+    for (Index i = std::max<Index>(hit_row - 1, 0); i <= std::min(hit_row + 1, rows - 1); ++i) {
+      for (Index j = std::max<Index>(hit_column - 1, 0);
+           j <= std::min(hit_column + 1, columns - 1); ++j) {
+        const bool is_it = i == hit_row && j == hit_column;
+        marks.put(i * columns + j, is_it ? Mark::hit : Mark::beside);
       }
     }
   }

@@ -1,0 +1,126 @@
+"""Planning in a scene that opens up while the robot drives."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pushplan.envs import PushEnv
+from pushplan.evaluation import run_episode
+from pushplan.perception import Detector, Lidar, WorldEstimate
+from pushplan.planners import make_policy
+from pushplan.runtime import CommandStatus, Runner
+from pushplan.scenarios import Scenario
+from pushplan.world import (
+    ClearanceArea,
+    GoalDisc,
+    Movables,
+    StaticMap,
+    World,
+    save_world,
+    turtlebot3_burger,
+)
+
+SQUARE = np.array([(-0.1, -0.1), (0.1, -0.1), (0.1, 0.1), (-0.1, 0.1)])
+SEGMENTS = [  # a wall with two doors, and behind the upper one a room without another way out
+    (0.0, 0.0, 4.0, 0.0),
+    (4.0, 0.0, 4.0, 3.0),
+    (4.0, 3.0, 0.0, 3.0),
+    (0.0, 3.0, 0.0, 0.0),
+    (1.5, 0.0, 1.5, 0.4),
+    (1.5, 0.9, 1.5, 2.0),
+    (1.5, 2.5, 1.5, 3.0),
+    (1.5, 1.5, 2.6, 1.5),
+    (2.6, 1.5, 2.6, 3.0),
+]
+
+
+def two_doors(boxes=()) -> World:
+    """A room whose upper door is nearer to the goal as long as nobody has looked through it."""
+    poses = np.array(boxes, dtype=float).reshape(-1, 3)
+    return World(
+        turtlebot3_burger(),
+        np.array([0.5, 2.0, 0.0]),
+        StaticMap.build(segments=SEGMENTS, radii=0.03, bounds=(0.0, 0.0, 4.0, 3.0)),
+        Movables.from_outlines([SQUARE] * len(poses), poses),
+        GoalDisc(np.array([3.4, 2.4]), 0.15),
+    )
+
+
+def drive(world: World, policy: str, tmp_path, **sensing):
+    path = tmp_path / "world.yaml"
+    save_world(world, path)
+    variations = {"world_file": str(path), "sensing": "lidar", **sensing}
+    env = PushEnv(task="room", variations=variations, observation="state")
+    return run_episode(env, make_policy(policy), Scenario("room", variations=variations))
+
+
+@pytest.mark.parametrize(
+    "policy",
+    [
+        "kinodynamic-rrt",
+        pytest.param("push-aware", marks=pytest.mark.slow),
+        pytest.param("namo", marks=pytest.mark.slow),
+    ],
+)
+def test_a_robot_does_not_waver_between_two_doors(policy, tmp_path):
+    episode = drive(two_doors([(1.9, 1.0, 0.3)]), policy, tmp_path)
+    assert episode.success, episode.reason
+    x, y = episode.robot_poses[:, :2].T
+    upper = y[x < 1.5] > 1.45
+    assert np.count_nonzero(upper[1:] != upper[:-1]) <= 1  # it has changed its mind once
+    length = np.hypot(*np.diff(episode.robot_poses[:, :2], axis=0).T).sum()
+    assert length < 8.0  # of the two ways one after the other, 7.3 m
+
+
+def test_a_runner_drives_with_what_its_sensors_see():
+    true = two_doors([(1.2, 0.6, 0.0)])
+    belief = WorldEstimate(true.robot, true.goal, true.static.bounds)
+    lidar, detector = Lidar(range=3.5), Detector(range=3.5)
+
+    def look(world: World) -> World:
+        belief.add_detections(detector.detect(world))
+        belief.add_scan(lidar.scan(world))
+        return belief.world(world.robot_pose, world.robot_twist, world.time)
+
+    path = [true.robot_pose]
+    with Runner("straight", period=0.2) as runner:
+        command = runner.start(look(true))
+        for step in range(1, 600):
+            belief.sent(command.twist)
+            turned = path[-1][2] + 0.2 * command.twist.angular
+            ahead = 0.2 * command.twist.linear * np.array([np.cos(turned), np.sin(turned)])
+            path.append(np.append(path[-1][:2] + ahead, turned))
+            true = true.moved(robot_pose=path[-1], time=0.2 * step)
+            runner.update(look(true))
+            command = runner.command(0.2 * step)
+            if command.status is CommandStatus.DONE:
+                break
+    assert command.status is CommandStatus.DONE and runner.failures == 0
+    assert true.goal_reached
+
+
+def test_an_object_that_nobody_has_seen_is_looked_for(tmp_path):
+    """It stands behind a wall; the area is clear as far as the robot sees."""
+    around = [(0, 0, 2, 0), (2, 0, 2, 2), (2, 2, 0, 2), (0, 2, 0, 0), (0.9, 0.9, 1.1, 0.9)]
+    world = World(
+        turtlebot3_burger("pusher"),
+        np.array([1.0, 0.4, np.pi / 2]),
+        StaticMap.build(segments=np.array(around, dtype=float), radii=0.02, bounds=(0, 0, 2, 2)),
+        Movables.from_outlines([0.4 * SQUARE], [[1.0, 1.1, 0.0]]),
+        ClearanceArea(
+            np.array([(0.4, 0.4), (1.6, 0.4), (1.6, 1.6), (0.4, 1.6)]), np.ones(4, dtype=bool)
+        ),
+    )
+    save_world(world, tmp_path / "world.yaml")
+    variations = {"world_file": str(tmp_path / "world.yaml"), "sensing": "objects"}
+    env = PushEnv(task="room", variations=variations, observation="state")
+    env.reset(seed=0)
+    assert len(env.world.movables) == 0 and env.world.completed.all()
+    policy = make_policy("greedy")
+    policy.reset(env.world, np.random.default_rng(0))
+    for _ in range(60):
+        env.step(env.encode(policy.act(env.world)))
+        if len(env.world.movables):
+            break
+    assert len(env.world.movables) == 1
