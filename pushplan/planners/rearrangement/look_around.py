@@ -21,45 +21,59 @@ class LookAround:
     """Visits the nearest place that nobody has looked at and where an object may be.
 
     With a `ClearanceArea` only places in the area count. A place that cannot be seen from near it,
-    or to which no way leads, is not visited again.
+    or to which no way leads, is not visited again. When all has been seen, each object is visited
+    once more: one that is out of sight may have been pushed by another.
     """
 
     def __init__(self) -> None:
-        self._follower = PlanFollower(make_planner("straight"))
+        self._follower = PlanFollower(make_planner("kinodynamic-rrt"))
         self._target: GoalDisc | None = None
         self._hopeless: list[FloatArray] = []
+        self._visited: set[int] = set()
 
     def command(self, world: World) -> Twist | None:
         """The next velocity; None where nothing is left to look at."""
         hidden = _hiding_places(world)
-        if hidden is None:
-            return None
         target = self._target
-        if target is not None and not _any_within(hidden, target.center, target.radius):
-            target = None  # it has been seen
-        elif target is not None and (
-            target.contains(world.robot_pose[:2])
-            or (self._follower.plan_log and self._follower.plan_log[-1].plan is None)
-        ):
-            self._hopeless.append(target.center)
-            target = None
+        if target is not None:
+            seen = not (np.hypot(*(hidden - target.center).T) <= target.radius).any()
+            no_way = self._follower.plan_log and self._follower.plan_log[-1].plan is None
+            there = target.contains(world.robot_pose[:2])
+            if there or no_way:
+                self._hopeless.append(target.center)
+            if there or no_way or (seen and not self._visited):
+                target = None
         if target is None:
-            target = self._next(world, hidden)
-            if target is None:
-                return None
-            self._follower.reset(_at_rest(world, target), np.random.default_rng(0))
+            target = self._place(world, hidden) or self._object(world)
+            if target is not None:
+                self._follower.reset(_at_rest(world, target), np.random.default_rng(0))
         self._target = target
-        return self._follower.act(_at_rest(world, target))
+        return None if target is None else self._follower.act(_at_rest(world, target))
 
-    def _next(self, world: World, hidden: FloatArray) -> GoalDisc | None:
+    def _place(self, world: World, hidden: FloatArray) -> GoalDisc | None:
         """The nearest of the places (N, 2) that is worth a visit."""
         radius = _NEAR * world.robot.circumscribed_radius
         for center in self._hopeless:
             hidden = hidden[np.hypot(*(hidden - center).T) > radius]
         if not len(hidden):
             return None
-        away = np.hypot(*(hidden - world.robot_pose[:2]).T)
-        return GoalDisc(hidden[int(np.argmin(away))], radius)
+        return GoalDisc(hidden[_nearest(world, hidden)], radius)
+
+    def _object(self, world: World) -> GoalDisc | None:
+        """The surroundings of the nearest object that was not visited; it is from now on."""
+        left = ~np.isin(world.movables.ids, list(self._visited))
+        if not left.any():
+            return None
+        objects = world.movables.select(left)
+        k = _nearest(world, objects.poses[:, :2])
+        self._visited.add(int(objects.ids[k]))
+        radius = _NEAR * world.robot.circumscribed_radius + float(objects.radii[k])
+        return GoalDisc(objects.poses[k, :2], radius)
+
+
+def _nearest(world: World, points: FloatArray) -> int:
+    """Index of the point (N, 2) that is nearest to the robot."""
+    return int(np.hypot(*(points - world.robot_pose[:2]).T).argmin())
 
 
 def _at_rest(world: World, goal: GoalDisc) -> World:
@@ -68,15 +82,10 @@ def _at_rest(world: World, goal: GoalDisc) -> World:
     return replace(world.believing(fixed).with_fixed_as_static(), goal=goal)
 
 
-def _any_within(points: FloatArray, center: FloatArray, radius: float) -> bool:
-    return bool((np.hypot(*(points - center).T) <= radius).any())
-
-
-def _hiding_places(world: World) -> FloatArray | None:
-    """(N, 2) middles of what nobody has seen and may hold an object [m]; None if there is none."""
+def _hiding_places(world: World) -> FloatArray:
+    """(N, 2) middles of the cells that nobody has seen and that may hold an object [m]."""
     unseen = world.unseen
-    if unseen is None:
-        return None
+    assert unseen is not None
     cells: BoolArray = unseen.cells
     points = unseen.centres(cells)
     bodies = [shapely.Polygon(part) for part in world.movables.every_part_world]
@@ -91,5 +100,5 @@ def _hiding_places(world: World) -> FloatArray | None:
     area = shapely.box(*world.static.bounds)
     if isinstance(world.goal, ClearanceArea):
         area = shapely.Polygon(world.goal.polygon)
-    points = points[shapely.contains_xy(area, points)]
-    return points if len(points) else None
+    found: FloatArray = points[shapely.contains_xy(area, points)]
+    return found
