@@ -45,14 +45,17 @@ class SimulatedSensing:
             heading_noise=variations.turn_noise,
             miss=variations.drop_out,
         )
-        self._interval = 0.0 if variations.view_rate is None else 1.0 / variations.view_rate
+        self._interval = 1.0 / (variations.view_rate or math.inf)
         self._delay = variations.view_delay
         self._rng = rng
+        known = None
+        if variations.sensing == "objects":
+            known = world.static
         self._estimate = WorldEstimate(
             world.robot,
             world.goal,
             world.static.bounds,
-            known=world.static if variations.sensing == "objects" else None,
+            known=known,
             unknown_price=variations.unknown_price,
             margin=world.margin or None,
         )

@@ -41,6 +41,8 @@ class Condition:
         variations: of the scenario.
         success: fraction of episodes that has to succeed; None where nothing is asked for.
         kept: least part of the undisturbed efficiency and effort scores; 0 where nothing is asked.
+        of_sensors: for scenarios in which the robot has sensors of its own; elsewhere it is only
+            run where it is asked for by name.
     """
 
     disturbances: Disturbances = field(default_factory=Disturbances)
@@ -48,6 +50,7 @@ class Condition:
     variations: Mapping[str, Any] = field(default_factory=dict)
     success: float | None = 0.95
     kept: float = 0.0
+    of_sensors: bool = False
 
 
 def _standard_conditions() -> dict[str, Condition]:
@@ -167,7 +170,8 @@ def stress(
     scenarios = chosen.scenarios
     if not scenarios:
         raise InvalidInputError("a stress test needs at least one scenario")
-    wanted = _conditions(conditions)
+    sensed = any(one.variations.get("sensing", "full") != "full" for one in scenarios)
+    wanted = _conditions(conditions, sensed)
     spec = parse_policy(policy)
     misfits([spec], [chosen], JobSettings())
     jobs = []
@@ -204,7 +208,9 @@ def _disturbed(
     return DisturbedPolicy(spec.make(), disturbances, period=period, planning_time=planning_time)
 
 
-def _conditions(given: Sequence[str] | Mapping[str, Condition] | None) -> dict[str, Condition]:
+def _conditions(
+    given: Sequence[str] | Mapping[str, Condition] | None, sensed: bool
+) -> dict[str, Condition]:
     if isinstance(given, Mapping):
         return {UNDISTURBED: CONDITIONS[UNDISTURBED], **given}
     if given is not None:
@@ -212,7 +218,7 @@ def _conditions(given: Sequence[str] | Mapping[str, Condition] | None) -> dict[s
             if name not in CONDITIONS:
                 raise UnknownNameError("condition", name, CONDITIONS)
         return {name: CONDITIONS[name] for name in dict.fromkeys((UNDISTURBED, *given))}
-    return dict(CONDITIONS)
+    return {name: one for name, one in CONDITIONS.items() if sensed or not one.of_sensors}
 
 
 def _judged(

@@ -76,10 +76,11 @@ class WorldEstimate:
         self._unknown = choice("treatment of unknown cells", unknown, UNKNOWN)
         self._unknown_price = number("unknown_price", unknown_price, low=0.0)
         self._drift = number("drift", drift, low=0.0)
-        cell = robot.inscribed_radius / _CELLS if cell is None else cell
+        if cell is None:
+            cell = robot.inscribed_radius / _CELLS
         self.map = ScanMap(bounds, cell, robot.circumscribed_radius)
         if margin is None:
-            margin = _INEXACT * self.map.cell if known is None else 0.0
+            margin = _INEXACT * self.map.cell * (known is None)
         self._margin = number("margin", margin, low=0.0)
         self.objects = Movables.empty()
         self.movability = Movability(robot)
@@ -167,11 +168,11 @@ class WorldEstimate:
             )
         world = World(
             self._robot,
-            np.asarray(pose, dtype=np.float64),
+            pose,  # type: ignore[arg-type]
             static,
             self.objects,
             self._goal,
-            None if twist is None else np.asarray(twist, dtype=np.float64),
+            twist,  # type: ignore[arg-type]
             time,
             self._margin,
             price,

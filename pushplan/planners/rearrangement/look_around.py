@@ -48,7 +48,9 @@ class LookAround:
             if target is not None:
                 self._follower.reset(_at_rest(world, target), np.random.default_rng(0))
         self._target = target
-        return None if target is None else self._follower.act(_at_rest(world, target))
+        if target is None:
+            return None
+        return self._follower.act(_at_rest(world, target))
 
     def _place(self, world: World, hidden: FloatArray) -> GoalDisc | None:
         """The nearest of the places (N, 2) that is worth a visit."""

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from pushplan.control import EpisodeClock
+from pushplan.imports.on_demand import need
 from pushplan.planners.arguments import check_pusher
-from pushplan.planners.rearrangement.look_around import LookAround
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.world import Twist, World
 from pushplan.world.checks import expect
@@ -25,6 +25,8 @@ class RearrangementPolicy(ABC):
 
     actions = ("velocity",)
     goal_kind = "objects"
+    _look_around: Any = None
+    """A `LookAround`, once one is needed."""
 
     def __init__(self, config: RearrangementConfig | None = None) -> None:
         self.config = expect("config", config or RearrangementConfig(), RearrangementConfig)
@@ -46,7 +48,10 @@ class RearrangementPolicy(ABC):
     def _act_or_look(self, world: World) -> Twist:
         """The velocity for an instant; looks around where no object is known that is left."""
         if world.unseen is not None and self._recovery is None and world.completed.all():
-            twist = self._look_around.command(world)
+            if self._look_around is None:  # it imports what nothing else here needs
+                module = need("pushplan.planners.rearrangement.look_around")
+                self._look_around = module.LookAround()
+            twist: Twist | None = self._look_around.command(world)
             if twist is not None:
                 return twist
         return self._act(world)
@@ -58,7 +63,7 @@ class RearrangementPolicy(ABC):
     def _forget(self) -> None:
         """Begin an episode."""
         self._clock = EpisodeClock(self.config.response)
-        self._look_around = LookAround()
+        self._look_around = None
         self._recovery: Callable[[World, float], Twist | None] | None = None
 
     def _recover(self, world: World) -> Twist | None:
