@@ -22,7 +22,7 @@ class SimulatedSensing:
 
     Args:
         variations: of the task: what is seen, how far, and with what noise.
-        world: the scene at the start of an episode, which is looked at.
+        world: the scene at the start of an episode, which the first call of `look` looks at.
         rng: of all noise.
 
     Attributes:
@@ -61,8 +61,7 @@ class SimulatedSensing:
         )
         self._inbox: deque[tuple[float, LidarScan, Detections]] = deque()
         self._seen_at = -math.inf
-        self._take_in(self._lidar.scan(world, rng), self._detector.detect(world, rng))
-        self.look(world)
+        self.world = world
 
     def look(self, world: World, driven: Twist | None = None) -> None:
         """Look at the scene as it is now, and bring `world` up to date.
@@ -73,15 +72,16 @@ class SimulatedSensing:
         """
         now = world.time
         if now >= self._seen_at + self._interval - 1e-9:
+            delay = self._delay
+            if self._seen_at == -math.inf:  # an episode begins when the first reading is there
+                delay = 0.0
             self._seen_at = now
             scan = self._lidar.scan(world, self._rng)
             detections = self._detector.detect(world, self._rng)
-            self._inbox.append((now + self._delay, scan, detections))
+            self._inbox.append((now + delay, scan, detections))
         while self._inbox and self._inbox[0][0] <= now + 1e-9:
-            self._take_in(*self._inbox.popleft()[1:])
+            _, scan, detections = self._inbox.popleft()
+            self._estimate.add_detections(detections)
+            self._estimate.add_scan(scan)
         self._estimate.sent(driven or Twist(0.0, 0.0))
         self.world = self._estimate.world(world.robot_pose, world.robot_twist, now)
-
-    def _take_in(self, scan: LidarScan, detections: Detections) -> None:
-        self._estimate.add_detections(detections)
-        self._estimate.add_scan(scan)

@@ -11,6 +11,7 @@ from typing import Any
 from pushplan.files.safe_files import known_keys
 from pushplan.learned.features import FeatureObservation
 from pushplan.observation import ImageObservation, ObservationBuilder, StateObservation
+from pushplan.perception import LidarObservation
 from pushplan.world import InvalidInputError, SchemaError
 from pushplan.world.checks import choice
 
@@ -18,6 +19,7 @@ KINDS: dict[str, type[Any]] = {
     "image": ImageObservation,
     "state": StateObservation,
     "features": FeatureObservation,
+    "lidar": LidarObservation,
 }
 GREATEST_SIZE = 2**24
 """Elements of an observation that a file may ask for."""

@@ -15,7 +15,9 @@ from pushplan.world import InvalidInputError, StaticMap
 from pushplan.world.checks import BoolArray, FloatArray, checked_bounds, frozen, number
 from pushplan.world.occupancy_grid import rectangle_cover
 
-_EVIDENCE = frozen(np.array([1.5, -0.4, -2.0, 4.5]))  # log-odds of a hit and of a miss, and their limits
+_EVIDENCE = frozen(
+    np.array([1.5, -0.4, -2.0, 4.5])
+)  # log-odds of a hit and of a miss, and their limits
 _GONE = -1.0  # log-odds below which an occupied cell is free again
 _TILE = 16  # cells along the side of a part of the map whose rectangles are found anew together
 _MOST_CELLS = 25_000_000

@@ -109,7 +109,9 @@ class TestDescribe:
             def observe(self, world):
                 return np.zeros(2, np.float32)
 
-        with pytest.raises(InvalidInputError, match="one of image, state, features, got Mine"):
+        with pytest.raises(
+            InvalidInputError, match="one of image, state, features, lidar, got Mine"
+        ):
             describe(maze(observation=Mine()))
 
     def test_an_action_that_files_do_not_know_is_refused(self, monkeypatch):
