@@ -47,13 +47,8 @@ def hall(count: int, rng: np.random.Generator) -> World:
 def command_times(seed: int) -> list[float]:
     """CPU time of each command of an episode [ms]."""
     variations = {"boxes": 6, "sensing": "lidar", "view_rate": 10.0, "control_step": 0.05}
-    env = PushEnv(
-        task="maze",
-        simulator="mujoco",
-        variations=variations,
-        observation="state",
-        action="velocity",
-    )
+    options: Any = {"observation": "state", "action": "velocity", "variations": variations}
+    env = PushEnv(task="maze", simulator="mujoco", **options)
     env.reset(seed=seed)
     took = []
     with Runner("push-aware", period=0.05) as runner:
