@@ -5,7 +5,7 @@ Usage::
     python docs/pictures.py [NAME ...]
 
 Writes into docs/images: `box-delivery-layouts`, `area-clearing-layouts`, `namo-order`, `rearrange`,
-`film`, `mujoco`, `gtsp-mpc`, `push-aware`, `ship-planners`; all of them without a name.
+`film`, `sensing`, `mujoco`, `gtsp-mpc`, `push-aware`, `ship-planners`; all of them without a name.
 `mujoco` needs OpenGL (docs/simulators-mujoco.md).
 """
 
@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -98,6 +99,20 @@ def _beside(*pictures: np.ndarray) -> np.ndarray:
         rows = (free // 2, free - free // 2)
         padded.append(np.pad(picture, (rows, (8, 8), (0, 0)), constant_values=255))
     return np.concatenate(padded, axis=1)
+
+
+def sensing() -> None:
+    """What a robot with a lidar knows of a maze at four times, with its plan."""
+    scenario = suite("maze-2d-10-lidar", episodes=1, first_seed=1).scenarios[0]
+    pictures = []
+
+    def look(step: int, world: World, policy: Any) -> None:
+        if step in (1, 90, 160, 200):
+            pictures.append(draw_world(world, plan=policy.current_plan, size_px=320))
+
+    with make(scenario, observation="state", action=("velocity",)) as env:
+        run_episode(env, make_policy("push-aware"), scenario, observer=look)
+    save_image(IMAGES / "sensing.png", _beside(*pictures))
 
 
 def mujoco() -> None:
@@ -201,6 +216,7 @@ DRAWN = {
     "namo-order": lambda: start_and_end("namo-2d-order", 1001, "namo", "namo-order.png"),
     "rearrange": lambda: start_and_end("rearrange-2d-3", 1001, "gtsp-mpc", "rearrange.png"),
     "film": film,
+    "sensing": sensing,
     "mujoco": mujoco,
     "gtsp-mpc": first_pushes,
     "push-aware": door,

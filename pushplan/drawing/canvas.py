@@ -6,6 +6,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from pushplan.drawing.palette import Color
+from pushplan.world import Unseen
 from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import arc_lengths
 
@@ -13,6 +14,7 @@ SMOOTHING = 2
 """Everything is drawn this many times larger and then averaged."""
 THIN = 3
 """Edges up to this width [px, before smoothing] need no round joints."""
+_THINLY = 70  # of 255
 NOMINAL_PX = 600.0
 """Longer side of a picture to which widths of lines refer [px]."""
 
@@ -81,6 +83,20 @@ class Canvas:
         r = radius_m * self.scale
         box = (x - r, y - r, x + r, y + r)
         self.draw.ellipse(box, fill=fill, outline=edge, width=self._width(width_px))
+
+    def shade(self, unseen: Unseen, color: Color) -> None:
+        """Lay a colour thinly over what nobody has seen."""
+        height, width = (
+            round(count * unseen.resolution * self.scale) for count in unseen.cells.shape
+        )
+        cells = np.where(unseen.cells[::-1], np.uint8(_THINLY), np.uint8(0))
+        mask = Image.fromarray(cells).resize(
+            (max(width, 1), max(height, 1)), Image.Resampling.NEAREST
+        )
+        left, low = unseen.origin.tolist()
+        top = low + unseen.cells.shape[0] * unseen.resolution
+        (x, y) = self.pixels(np.array([[left, top]]))[0]
+        self.image.paste(color, (round(x), round(y)), mask)
 
     def finish(self) -> Image.Image:
         """The smooth picture at its final size."""

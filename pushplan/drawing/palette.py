@@ -16,6 +16,7 @@ class Palette:
 
     floor: Color = "#faf9f6"  # the ground
     wall: Color = "#545458"  # static obstacles
+    unseen: Color = "#8c8a86"  # laid thinly over what nobody has seen
     robot: Color = "#0072b2"  # the chassis
     robot_edge: Color = "#00426e"  # outline of the robot
     bumper: Color = "#263242"  # its other parts

@@ -39,7 +39,8 @@ def draw_world(
 ) -> NDArray[np.uint8]:
     """Draw a world from above.
 
-    A world with a goal line and nothing static is drawn as water with ice on it.
+    A world with a goal line and nothing static is drawn as water with ice on it; what nobody has
+    seen is grey.
 
     Args:
         world: what to draw; objects on casters are light, the others dark.
@@ -64,6 +65,8 @@ def draw_world(
     ground = ground_picture(world.static, world.goal, palette, shown, size_px)
     canvas = Canvas(np.array(shown), size_px, palette.floor)
     canvas.image.paste(ground)
+    if world.unseen is not None:
+        canvas.shade(world.unseen, palette.unseen)
     draw_moving(canvas, world, plan, trail, object_trails)
     picture = canvas.finish()
     if text:

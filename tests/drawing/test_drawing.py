@@ -24,6 +24,7 @@ from pushplan.world import (
     Receptacle,
     RobotModel,
     StaticMap,
+    Unseen,
     World,
 )
 
@@ -136,6 +137,16 @@ def test_same_world_same_bytes_and_no_leftovers_of_another() -> None:
     draw_world(scene(), size_px=SIZE, plan=plan_of(scene()), text="x")
     draw_world(scene(GoalLine(np.array([0.0, 8.0]), np.array([0.0, 1.0]))), size_px=SIZE)
     assert draw_world(scene(), size_px=SIZE).tobytes() == first.tobytes()
+
+
+def test_what_nobody_has_seen_is_grey() -> None:
+    cells = np.zeros((20, 22), dtype=bool)
+    cells[12:, 14:] = True  # the map goes on beyond the picture
+    hidden = replace(scene(), unseen=Unseen(cells, 0.6, np.array([-1.0, -1.0])))
+    before, after = draw_world(scene(), size_px=SIZE), draw_world(hidden, size_px=SIZE)
+    grey = (before != after).any(axis=2)
+    assert grey[: int(0.38 * SIZE), int(0.74 * SIZE) + 2 :].all()
+    assert not grey[int(0.38 * SIZE) + 2 :].any() and not grey[:, : int(0.74 * SIZE) - 2].any()
 
 
 def test_long_maps_keep_their_shape_with_even_sides() -> None:
