@@ -14,7 +14,7 @@ from pushplan.perception.lidar import LidarScan, object_outlines
 from pushplan.perception.movability import Movability
 from pushplan.perception.scan_map import ScanMap
 from pushplan.world import Goal, Movables, PriceMap, RobotModel, StaticMap, Twist, World
-from pushplan.world.checks import FloatArray, choice, number
+from pushplan.world.checks import FloatArray, choice, expect, number
 from pushplan.world.occupancy_grid import UNKNOWN
 from pushplan.world.unseen import Unseen
 
@@ -70,7 +70,7 @@ class WorldEstimate:
         drift: float = 0.02,
         margin: float | None = None,
     ) -> None:
-        self._robot = robot
+        self._robot = expect("robot", robot, RobotModel)
         self._goal = goal
         self._known = known
         self._unknown = choice("treatment of unknown cells", unknown, UNKNOWN)
@@ -100,7 +100,7 @@ class WorldEstimate:
 
     def add_detections(self, detections: Detections) -> None:
         """Take the objects that were seen at one time; older ones than before change nothing."""
-        seen = detections.objects
+        seen = expect("detections", detections, Detections).objects
         new = [detections.time > self._seen_at.get(k, -math.inf) for k in seen.ids.tolist()]
         self._put(seen.select(np.array(new, dtype=np.bool_)), detections.time)
 
@@ -113,7 +113,7 @@ class WorldEstimate:
 
     def add_scan(self, scan: LidarScan) -> None:
         """Take a laser scan."""
-        self._time = max(self._time, scan.time)
+        self._time = max(self._time, expect("scan", scan, LidarScan).time)
         self._forget(scan)
         hit = np.isfinite(scan.ranges)
         of_object = np.zeros(len(hit), dtype=np.bool_)

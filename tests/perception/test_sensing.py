@@ -248,6 +248,16 @@ class TestWorldEstimate:
         with pytest.raises(InvalidInputError, match=said):
             WorldEstimate(ROBOT, GOAL, HALL, **{"cell": 0.05, **options})
 
+    def test_what_is_no_reading_is_refused(self):
+        with pytest.raises(InvalidInputError, match="scan must be a LidarScan, got 5"):
+            estimate().add_scan(5)
+        with pytest.raises(InvalidInputError, match="detections must be a Detections"):
+            estimate().add_detections(Movables.empty())
+        with pytest.raises(InvalidInputError, match="robot must be a RobotModel"):
+            WorldEstimate("jackal", GOAL, HALL)
+        with pytest.raises(InvalidInputError, match="bounds"):
+            WorldEstimate(ROBOT, GOAL, (0.0, 0.0, 0.0, math.nan))
+
     def test_no_reading_changes_nothing(self):
         belief = estimate()
         nothing = Movables.empty()
