@@ -112,9 +112,8 @@ def shortest_lengths(start: World, chosen: BoolArray, *, reference: bool = False
     ids = start.movables.ids[chosen]
     places = start.movables.poses[chosen, :2]
     if reference:
-        from scipy.spatial.distance import (
-            cdist,
-        )  # takes half a second to import, and scores of navigation need neither
+        # takes half a second to import, and scores of navigation need neither
+        from scipy.spatial.distance import cdist
 
         lengths[chosen] = shared_ways(
             goal, ids, places, lambda end, points: cdist(points, _reference_ends(end)).min(axis=1)
