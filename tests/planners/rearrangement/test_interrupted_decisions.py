@@ -66,7 +66,7 @@ def test_a_search_for_relocations_goes_on_where_it_was_interrupted():
     search = RelocationSearch(here, 0, approach_tree(here), False)
     calls = 0
     while search.interrupted:
-        here.budget.start(MaxIterations(40), math.inf)
+        here.budget.start(MaxIterations(400), math.inf)
         found = search.run()
         calls += 1
         assert calls < 1000
