@@ -643,4 +643,5 @@ if __name__ == "__main__":
     if "CORE_CALLS_ANY_MEMORY" not in os.environ:  # sanitizers need more
         resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
     np.seterr(all="ignore")
-    print(json.dumps(Caller(sys.argv[1], sys.argv[3]).run(int(sys.argv[2]))))
+    calls = int(sys.argv[2])
+    print(json.dumps([Caller(room, sys.argv[3]).run(calls) for room in sys.argv[1].split(",")]))

@@ -58,6 +58,7 @@ def test_the_table_of_spaces_is_true() -> None:
     assert seen == set(pushplan.envs.registry.GYM_IDS)
 
 
+@pytest.mark.slow
 def test_policies_that_ship_are_compared(tmp_path: Path) -> None:
     text = script("maze-sac").replace("episodes=2", "episodes=1")
     assert "maze-ppo" in run(text, tmp_path)

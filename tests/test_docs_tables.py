@@ -87,6 +87,7 @@ def test_a_run_is_taken_written_and_checked(
     assert code == 1 and "may have an episode once" in said
 
 
+@pytest.mark.slow
 def test_scenarios_of_a_suite_that_share_a_seed_are_kept_apart(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -7,6 +7,7 @@ import re
 import runpy
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -87,6 +88,18 @@ class TestWorlds:
         assert y > 0.4 and abs(x) < 0.15 and abs(turn) < 0.1  # along the wall
         quick = make_planner("push-aware").plan(world("blocked_door"), stop=MaxIterations(1000))
         assert quick.status is PlanStatus.TIMED_OUT
+
+    @pytest.mark.parametrize("planner", ["push-aware", "kinodynamic-rrt", "namo"])
+    def test_the_box_in_the_door_of_the_room_is_pushed_although_there_is_a_way_around(
+        self, planner
+    ):
+        room = world("room")
+        around = replace(room, movables=room.movables.holding_fixed([True, False]))
+        plan = make_planner(planner).plan(room, stop=MaxIterations(500)).plan
+        moved = np.hypot(*(plan.object_poses[-1] - plan.object_poses[0])[:, :2].T)
+        assert moved[0] > 0.1 and moved[1] == 0.0
+        longer = make_planner("push-aware").plan(around, stop=MaxIterations(500)).plan
+        assert longer.cost > plan.cost
 
     def test_the_office_is_read_from_its_map(self):
         office = world("office_map")

@@ -41,6 +41,7 @@ def test_trees_take_turns_and_ratios_are_of_pairs() -> None:
     assert low <= found.ratio <= high < 0.6
 
 
+@pytest.mark.slow
 def test_a_tree_is_as_fast_as_itself_and_gives_the_same(capsys: pytest.CaptureFixture[str]) -> None:
     with side("old", ROOT, None, True) as old, side("new", ROOT, None, True) as new:
         found = compare(old, new, SHORT, 3)

@@ -20,7 +20,7 @@ gtsp::WalkClusters walk_clusters(const Floats<1>& prices, const Integers<1>& siz
   return {view(prices), view(sizes), view(moves)};
 }
 
-constexpr Index kMostReach = 1'000'000;  // neighbours; a problem has fewer
+constexpr Index kMostNeighbours = 1'000'000;  // neighbours; a problem has fewer
 
 /// An order of all clusters.
 std::span<const Index> order_of(const Integers<1>& order, Index clusters) {
@@ -77,7 +77,7 @@ void bind_gtsp(nb::module_& module) {
             const auto places = order_of(order, problem.clusters());
             require_between("max_removed", max_removed, 1,
                             std::max(Index{1}, problem.clusters() - 2));
-            require_between("reach", reach, 0, kMostReach);
+            require_between("reach", reach, 0, kMostNeighbours);
             new (self) gtsp::RuinRecreate(problem, {max_removed, blink, reach},
                                           {places.begin(), places.end()}, seed);
           },

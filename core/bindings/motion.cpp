@@ -138,7 +138,7 @@ void bind_primitives(nb::module_& module) {
       [](double heading, double target, double radius, Index reach, double slack,
          const FloatsOut<2>& out) {
         require_between("reach", reach, 0, kMostReach);
-        return find_connections(heading, target, {radius, reach, slack}, rows_as<Connection>(out));
+        return find_connections(heading, target, {radius, reach, slack}, rows_as<LatticeConnection>(out));
       },
       "heading"_a, "target"_a, "radius"_a, "reach"_a, "slack"_a, "out"_a.noconvert(), ReleaseGil());
   module.def(

@@ -267,7 +267,7 @@ void bind_ways_out(nb::module_& module) {
         {
           nb::gil_scoped_release released;
           path = recovery_path(
-              {pose(start), rows_as<const DriveStep>(steps), body, grown, among, size});
+              {pose(start), rows_as<const RecoveryStep>(steps), body, grown, among, size});
         }
         return copied_rows<double>(std::span<const Pose>(path));
       },

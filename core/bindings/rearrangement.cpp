@@ -32,11 +32,11 @@ Index extent(const auto& array, std::size_t axis) { return static_cast<Index>(ar
 
 /// Zeros to fill, which Python gets as an array of its own.
 template <class T, std::size_t Rank>
-class NewArray {
+class OwnedArray {
  public:
   using Shape = typename ArrayView<T, Rank>::Shape;
 
-  explicit NewArray(const Shape& shape) : view_(nullptr, shape) {
+  explicit OwnedArray(const Shape& shape) : view_(nullptr, shape) {
     numbers_ = std::make_unique<T[]>(static_cast<std::size_t>(view_.size()));
     view_ = {numbers_.get(), shape};
   }
@@ -98,7 +98,7 @@ void bind_goal(nb::module_& module) {
       "all_done",
       [](const Poses& objects, const Bodies& bodies, const ObjectGoal& goal) {
         require_objects(objects, bodies);
-        NewArray<bool, 1> done({extent(objects, 0)});
+        OwnedArray<bool, 1> done({extent(objects, 0)});
         without_gil(
             [&] { GoalTest(bodies.shapes, goal).all_done(poses(objects), done.numbers()); });
         return done.give();
@@ -112,9 +112,9 @@ void bind_goal(nb::module_& module) {
         require_indices("delivers", view(delivers), Index{1} << objects);
         require_count("costs", costs.shape(0), delivers.shape(0) + 1);
         require_count("columns of costs", costs.shape(1), delivers.shape(0));
-        const NewArray<double, 2>::Shape shape{Index{1} << objects, extent(costs, 0)};
-        NewArray<double, 2> best(shape);
-        NewArray<Index, 2> following(shape);
+        const OwnedArray<double, 2>::Shape shape{Index{1} << objects, extent(costs, 0)};
+        OwnedArray<double, 2> best(shape);
+        OwnedArray<Index, 2> following(shape);
         without_gil([&] {
           fill_cost_to_go(view(costs), view(delivers), objects, {best.view(), following.view()});
         });
@@ -204,7 +204,7 @@ void bind_grid(nb::module_& module) {
              const Bodies& bodies) {
             require_objects(objects, bodies);
             const PoseGrid& grid = self.grid;
-            NewArray<float, 4> out({extent(objects, 0), static_cast<Index>(kHeadingCount),
+            OwnedArray<float, 4> out({extent(objects, 0), static_cast<Index>(kHeadingCount),
                                     grid.rows(), grid.columns()});
             without_gil([&] {
               contact_depths(grid, shape, poses(objects), bodies.objects, bodies.radii, out.view());
@@ -229,8 +229,8 @@ void bind_grid(nb::module_& module) {
             for (const double cost : view(start_costs)) require_not_negative("start_costs", cost);
             require_not_negative("turn_cost", turn_cost);
             require_not_negative("arm", arm);
-            NewArray<double, 1> costs({count});
-            NewArray<Index, 1> before({count});
+            OwnedArray<double, 1> costs({count});
+            OwnedArray<Index, 1> before({count});
             without_gil([&] {
               PoseSearch search({self.grid, view(depths), view(touch), turn_cost, arm},
                                 costs.numbers(), before.numbers());
@@ -245,10 +245,10 @@ void bind_grid(nb::module_& module) {
       "add_layers",
       [](const Array<const float, 4>& layers, const Floats<1>& weights) {
         require_count("weights", weights.shape(0), layers.shape(0));
-        const NewArray<double, 3>::Shape shape{extent(layers, 1), extent(layers, 2),
+        const OwnedArray<double, 3>::Shape shape{extent(layers, 1), extent(layers, 2),
                                                extent(layers, 3)};
-        NewArray<double, 3> depth(shape);
-        NewArray<double, 3> touch(shape);
+        OwnedArray<double, 3> depth(shape);
+        OwnedArray<double, 3> touch(shape);
         without_gil([&] { add_layers(view(layers), view(weights), depth.view(), touch.view()); });
         return std::pair(depth.give(), touch.give());
       },
@@ -261,7 +261,7 @@ void bind_grid(nb::module_& module) {
         require_count("extra", extra.shape(0), nodes.shape(0));
         require_indices("nodes", view(nodes), extent(costs, 0));
         if (ends.shape(0) > 0) require_offsets("ends", view(ends), nodes.shape(0));
-        NewArray<double, 1> out({extent(ends, 0)});
+        OwnedArray<double, 1> out({extent(ends, 0)});
         least_costs(view(costs), {view(nodes), view(extra), view(ends)}, out.numbers());
         return out.give();
       },
@@ -274,7 +274,7 @@ void bind_poses(nb::module_& module) {
       "pose_behind",
       [](const OnePose& object, const Points& outline, double heading, double shift,
          double distance) {
-        NewArray<double, 1> out({3});
+        OwnedArray<double, 1> out({3});
         *out.as<Pose>() = pose_behind(pose(object), points(outline), heading, shift, distance);
         return out.give();
       },
@@ -286,7 +286,7 @@ void bind_poses(nb::module_& module) {
         const auto centres = grid_as<const Vec2>(middles);
         require_count("rows of is_open", is_open.shape(0), centres.extent(0));
         require_count("columns of is_open", is_open.shape(1), centres.extent(1));
-        NewArray<bool, 3> out(
+        OwnedArray<bool, 3> out(
             {static_cast<Index>(kHeadingCount), extent(middles, 0), extent(middles, 1)});
         without_gil([&] {
           CollisionChecker checker(shape, among);
@@ -306,7 +306,7 @@ void bind_poses(nb::module_& module) {
         require_count("columns of pushable", pushable.shape(2), is_open.shape(1));
         require_not_negative("step", step);
         require_not_negative("drag_cost", drag_cost);
-        NewArray<double, 2> out({extent(is_open, 0), extent(is_open, 1)});
+        OwnedArray<double, 2> out({extent(is_open, 0), extent(is_open, 1)});
         require_indices("goals", view(goals), out.view().size());
         without_gil([&] {
           fill_push_costs(view(is_open), view(pushable), view(goals), step, drag_cost, out.view());
@@ -422,11 +422,11 @@ void bind_pushes(nb::module_& module) {
             require_between("target", target, -1, count - 1);
             if (target >= 0) require_room("path", path.shape(0), 1);
             require_between("longest", longest, 1, kMostPoses);
-            NewArray<double, 2> track({longest, 3});
-            NewArray<Index, 1> steps({kStages});
-            NewArray<double, 3> stages({kStages, count, 3});
-            NewArray<double, 2> lengths({kStages, count});
-            NewArray<double, 1> box({4});
+            OwnedArray<double, 2> track({longest, 3});
+            OwnedArray<Index, 1> steps({kStages});
+            OwnedArray<double, 3> stages({kStages, count, 3});
+            OwnedArray<double, 2> lengths({kStages, count});
+            OwnedArray<double, 1> box({4});
             RolloutSize size{};
             without_gil([&] {
               size = self.run(pose(start), poses(objects),
@@ -455,8 +455,8 @@ void bind_pushes(nb::module_& module) {
         require_objects(objects, model.bodies());
         require_index("target", target, count);
         require_between("steps", steps, 0, kMostPoses);
-        NewArray<double, 3> tracks({extent(arcs, 0), steps + 1, 3});
-        NewArray<double, 4> out({extent(arcs, 0), steps + 1, count, 3});
+        OwnedArray<double, 3> tracks({extent(arcs, 0), steps + 1, 3});
+        OwnedArray<double, 4> out({extent(arcs, 0), steps + 1, count, 3});
         ArcSweep sweep{{tracks.as<Pose>(), {extent(arcs, 0), steps + 1}},
                        {out.as<Pose>(), {extent(arcs, 0), steps + 1, count}}};
         without_gil([&] {

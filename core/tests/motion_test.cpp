@@ -172,13 +172,13 @@ void rooms_are_left_by_their_gaps() {
 
 /// Primitives end on lattice points; swaths hold each newly covered cell once.
 void primitives_join_lattice_points() {
-  std::vector<Connection> found(500);
+  std::vector<LatticeConnection> found(500);
   const double heading = std::atan2(1.0, 2.0);
   const Index count = find_connections(0.0, heading, {3.0, 6, 0.1}, found);
   CHECK(count > 0 && count < 500);
   const Shapes robot({rectangle(-2.2, -1.2, 2.2, 1.2)});
   for (Index i = 0; i < count; ++i) {
-    const Connection& connection = found[static_cast<std::size_t>(i)];
+    const LatticeConnection& connection = found[static_cast<std::size_t>(i)];
     Pose at{0.0, 0.0, 0.0};
     for (const Arc& arc : connection.arcs) at = along_arc(at, arc);
     CHECK(same_place(at, {connection.end.x, connection.end.y, heading}, 1e-6));

@@ -7,11 +7,12 @@ import json
 import math
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from pushplan.evaluation import PolicySpec
     from pushplan.world import Episode
 
 
@@ -72,6 +73,13 @@ def tell(options: argparse.Namespace, value: Any, *lines: str) -> None:
         say_json(value)
     elif lines:
         say("\n".join(lines))
+
+
+def say_without_deadline(policies: Iterable[PolicySpec]) -> None:
+    """Name on standard error the policies that take no limit of their planning calls."""
+    free = [spec.label for spec in policies if "stop" not in spec.options]
+    if free:
+        sys.stderr.write(f"without a deadline, since they take none: {', '.join(free)}\n")
 
 
 def say_written(options: argparse.Namespace, *files: str | None) -> None:

@@ -13,6 +13,7 @@ from pushplan.cli.common import (
     save_episode,
     say,
     say_json,
+    say_without_deadline,
     say_written,
 )
 from pushplan.cli.scenario_options import scenario_of
@@ -28,12 +29,16 @@ def run(options: argparse.Namespace) -> int:
     from pushplan.cli.film import Camera
     from pushplan.evaluation import Job, JobSettings, PolicyError, parse_policy, run_episode
     from pushplan.evaluation.run.execute import dry_run
+    from pushplan.evaluation.run.policy_specs import with_deadline
     from pushplan.evaluation.store.rows import Status, blank_row, scored_row
 
     scenario = scenario_of(options)
     check_episode_file(options.out)
     camera = Camera(options.render) if options.render else None
     spec = parse_policy(options.policy)
+    if options.deadline is not None:
+        spec = with_deadline(spec, options.deadline)
+        say_without_deadline([spec])
     policy = spec.make()
     settings = JobSettings(observation=options.observation)
     mode = "human" if options.live else None

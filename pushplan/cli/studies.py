@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pushplan.cli.common import duration, say, tell
+from pushplan.cli.common import duration, say, say_without_deadline, tell
 from pushplan.cli.output_files import check_directory
 from pushplan.cli.progress import progress_of
 from pushplan.cli.scenario_options import start_of_task
@@ -41,10 +41,13 @@ def bench(options: argparse.Namespace) -> int:
         episodes=options.episodes,
         observation=options.observation,
         latency_factor=options.latency,
+        deadline_s=options.deadline,
         seed=options.seed,
         timeout_s=options.timeout,
         memory_limit_mb=options.memory,
     )
+    if options.deadline is not None:
+        say_without_deadline(experiment.policies)
     out = options.out or os.path.join("runs", experiment.name)
     check_directory(out)
     return _run(experiment, out, options)

@@ -13,7 +13,7 @@ from pushplan.evaluation.report.results import Results
 from pushplan.evaluation.run.batch import Progress
 from pushplan.evaluation.run.job_limits import MEMORY_MB
 from pushplan.evaluation.run.jobs import JobSettings
-from pushplan.evaluation.run.policy_specs import PolicySpec, parse_policies
+from pushplan.evaluation.run.policy_specs import PolicySpec, parse_policies, with_deadline
 from pushplan.world import InvalidInputError
 
 if TYPE_CHECKING:
@@ -38,6 +38,7 @@ def bench(
     shard: tuple[int, int] | None = None,
     dask: str | None = None,
     latency_factor: float | None = None,
+    deadline_s: float | None = None,
     progress: Progress | None = None,
 ) -> Results:
     """Run every policy on every scenario of a suite.
@@ -69,6 +70,8 @@ def bench(
         any_version, shard, dask: as for `Experiment.run`.
         latency_factor: seconds of the world's clock for each second that a policy computes; None
             for a world that stands still meanwhile. See `run_episode`.
+        deadline_s: wall-clock limit of each planning call [s], of the policies that take one;
+            None for the limits of the policies, which repeat on every machine.
         progress: told of every row.
 
     Raises:
@@ -85,6 +88,7 @@ def bench(
         observation=observation,
         memory_limit_mb=memory_limit_mb,
         latency_factor=latency_factor,
+        deadline_s=deadline_s,
     )
     return experiment.run(
         out,
@@ -107,14 +111,18 @@ def bench_experiment(
     observation: str = "auto",
     memory_limit_mb: float | None = MEMORY_MB,
     latency_factor: float | None = None,
+    deadline_s: float | None = None,
 ) -> Experiment:
     """Return the experiment that `bench` runs; arguments and errors as there."""
     suites = suites_of(suite, episodes, seed)
     versions = [one.version for one in suites]
+    specs = parse_policies(policies)
+    if deadline_s is not None:
+        specs = [with_deadline(spec, deadline_s) for spec in specs]
     return Experiment(
         ",".join(one.name for one in suites),
         suites,
-        tuple(parse_policies(policies)),
+        tuple(specs),
         JobSettings(observation=observation, timeout_s=timeout_s, latency_factor=latency_factor),
         memory_limit_mb=memory_limit_mb,
         about={

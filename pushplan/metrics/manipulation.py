@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import networkx as nx
 import numpy as np
-from scipy.spatial.distance import cdist
 
 from pushplan.geometry import VisibilityGraph, object_ways
 from pushplan.geometry.object_ways import shared_ways
@@ -114,6 +112,9 @@ def shortest_lengths(start: World, chosen: BoolArray, *, reference: bool = False
     ids = start.movables.ids[chosen]
     places = start.movables.poses[chosen, :2]
     if reference:
+        # takes half a second to import, and scores of navigation need neither
+        from scipy.spatial.distance import cdist
+
         lengths[chosen] = shared_ways(
             goal, ids, places, lambda end, points: cdist(points, _reference_ends(end)).min(axis=1)
         )
@@ -140,6 +141,8 @@ def spanning_tree_length(static: StaticMap | None, points: list[FloatArray]) -> 
 
     Edges are shortest paths of a point around what is static, straight lines without a map.
     """
+    import networkx as nx  # imported here as scipy is above
+
     paths = None
     if static is not None and not static.is_empty:
         paths = VisibilityGraph(static, exact=True)

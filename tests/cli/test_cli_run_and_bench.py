@@ -51,6 +51,40 @@ def without_timings(path: Path) -> list[list[str]]:
     return [[line[i] for i in keep] for line in lines]
 
 
+LIMITED = """
+from pushplan.planners import make_planner
+from pushplan.world import Twist
+
+class Shown:
+    def plan(self, world, *, stop=None, rng=None):
+        print("limit", stop.seconds)
+        return make_planner("straight").plan(world)
+
+class Stands:
+    def reset(self, world, rng):
+        pass
+    def act(self, world, observation):
+        return Twist(0.0, 0.0)
+"""
+
+
+def test_a_deadline_limits_each_planning_call_of_what_plans(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("limited.py").write_text(LIMITED)
+    task = ["--task", "maze", "--boxes", "1", "--set", "time_limit=2.0", "--deadline", "0.25"]
+    assert main(["run", *task, "--policy", "limited.py:Shown"]) == 0
+    assert "limit 0.25" in capsys.readouterr().out
+    policies = "limited.py:Shown,limited.py:Stands,straight,push-aware"
+    options = ["--episodes", "1", "--workers", "0", "--out", "run"]
+    assert main(["bench", *task, "--policies", policies, *options]) == 0
+    said = capsys.readouterr()
+    assert "limit 0.25" in said.out
+    assert "without a deadline, since they take none: Stands, straight\n" in said.err
+    assert Results.load("run").about["deadlines"] == {"Shown": 0.25, "push-aware": 0.25}
+
+
 def test_run_prints_scores_and_writes_what_was_asked(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

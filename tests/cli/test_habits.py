@@ -155,6 +155,7 @@ def test_what_a_machine_reads_is_json_on_demand() -> None:
     assert without == {*writers, "describe"}
 
 
+@pytest.mark.usefixtures("empty_figures")
 def test_commands_print_one_json_value_and_nothing_else(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -136,7 +136,7 @@ YAMLS = {
     "long": ("time: " + "9" * 5000, "400 digits"),
     "hexadecimal": ("time: 0x" + "f" * 5000, "400 digits"),
     "exponent": ("time: 1e" + "1" * 5000, "400 digits"),
-    "many": ("[" + "1," * 100_000 + "1]", "60,000 values"),
+    "many": ("[" + "1," * 60_000 + "1]", "60,000 values"),
     "escapes": ('"\\e[2J\\e[31m": 1', r"\x1b[2J"),
     "tag": ("!!bool maybe", "not valid YAML"),
     "object": ("!!python/object/apply:os.getcwd []", "not valid YAML"),

@@ -23,6 +23,8 @@ VARIED = {
 
 
 def environment(task, simulator="pymunk", **variations):
+    if task == "office":
+        variations.setdefault("polygons", 100)  # of the smallest; a thousand take most of a second
     return PushEnv(task=task, simulator=simulator, observation="state", variations=variations)
 
 

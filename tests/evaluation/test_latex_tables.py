@@ -39,6 +39,15 @@ def tables() -> list[Table]:
     ]
 
 
+def test_a_label_names_each_table_once(tables: list[Table]) -> None:
+    labels = re.findall(r"\\label{(.*?)}", latex(tables))
+    assert len(set(labels)) == len(labels) == latex(tables).count(r"\caption{")
+    assert all(re.fullmatch(r"tab:[a-z0-9-]+", label) for label in labels)
+    some = [Table(title, ("policy",), (("a",),)) for title in ("maze, 5 boxes", "maze", "Maze")]
+    found = re.findall(r"\\label{(.*?)}", latex([*some, Table("maze 2", ("policy",), ())]))
+    assert found == ["tab:maze-5-boxes", "tab:maze", "tab:maze-2", "tab:maze-2-2"]
+
+
 def test_notes_are_broken_within_names_and_never_within_words() -> None:
     text = latex([Table("rooms", ("policy",), (("straight",),), f"{PAIR_NOTE}; {LONG}")])
     plain, _, name = text.partition("differences hold; ")

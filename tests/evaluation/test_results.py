@@ -126,6 +126,21 @@ def test_the_paired_table_says_what_its_rows_are(results: Results) -> None:
     assert line[1] == "better - plain" and line[2] == "+0.061 *"
 
 
+def test_a_mean_that_the_test_contradicts_is_pointed_out(results: Results) -> None:
+    def mostly_better(row: ResultRow) -> ResultRow:
+        shift = 0.0 if row.policy == "plain" else -0.5 if row.seed == 3 else 0.01
+        score = 0.6 + 0.001 * row.seed + shift
+        return replace(row, metrics={**row.metrics, "E_nav": score})
+
+    mixed = Results(tuple(map(mostly_better, results.rows)))
+    pair = next(p for p in mixed.compare() if p.metric == "E_nav")
+    assert pair.significant and pair.effect * pair.difference.mean < 0.0
+    notes = [table.note for table in mixed.tables(settings=True) if "Paired" in table.title]
+    said = "mean and test point in different directions in E_nav of plain - better: few large"
+    assert all(said in note for note in notes) and notes
+    assert not any(said in table.note for table in results.tables(settings=True))
+
+
 def test_several_settings_have_one_aggregate(results: Results) -> None:
     tables = results.tables(wide=True, settings=True)
     table = next(t for t in tables if t.title == "Interquartile means of all 2 settings")

@@ -314,7 +314,7 @@ class TestHostile:
 
     def test_a_network_that_takes_forever(self, tmp_path, monkeypatch):
         monkeypatch.setattr(onnx_session, "LONGEST_DECISION_S", 0.05)
-        side = np.zeros((1500, 1500), np.float32)
+        side = np.zeros((700, 700), np.float32)
         nodes = [helper.make_node("MatMul", ["side", "side"], ["m0"])]
         nodes += [helper.make_node("MatMul", [f"m{i}", "side"], [f"m{i + 1}"]) for i in range(400)]
         nodes += [

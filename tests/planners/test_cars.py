@@ -80,8 +80,21 @@ def test_straight_leads_a_car_through_objects_and_predicts_nothing():
 
 
 @pytest.mark.parametrize("kind", CARS)
-@pytest.mark.parametrize("policy", ["straight", "kinodynamic-rrt"])
-@pytest.mark.parametrize("simulator", SIMULATORS, ids=lambda s: s.name)
+@pytest.mark.parametrize(
+    ("simulator", "policy"),
+    [
+        pytest.param(
+            simulator,
+            policy,
+            # each simulator and each policy once; the others take as long
+            marks=()
+            if (simulator.name == "mujoco") == (policy == "straight")
+            else pytest.mark.slow,
+        )
+        for simulator in SIMULATORS
+        for policy in ("straight", "kinodynamic-rrt")
+    ],
+)
 def test_closed_loops_arrive_within_the_turning_radius(simulator, policy, kind):
     world = hall(CARS[kind], -2.0)
     engine = simulator()

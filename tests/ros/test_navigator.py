@@ -132,8 +132,15 @@ def test_what_cannot_be_served_has_the_code_of_nav2(code, call):
     assert not robot.navigator.is_driving
 
 
-@pytest.mark.parametrize("planner", ["straight", "push-aware"])
-@pytest.mark.parametrize("controller", ["path", "push-aware"])
+@pytest.mark.parametrize(
+    ("planner", "controller"),
+    [
+        ("straight", "path"),
+        ("push-aware", "push-aware"),
+        pytest.param("straight", "push-aware", marks=pytest.mark.slow),
+        pytest.param("push-aware", "path", marks=pytest.mark.slow),
+    ],
+)
 def test_the_orientation_of_a_goal_counts_where_a_tolerance_is_set(planner, controller):
     tolerance = math.radians(4.0)
     robot = Robot(planner=planner, heading_tolerance=tolerance)

@@ -30,7 +30,7 @@ def rest(world, name, noise=(0.0, 0.0), seconds=60.0):
     rng = np.random.default_rng(0)
     true = world
     options = {"position_noise": noise[0], "heading_noise": noise[1]}
-    stop = MaxIterations(500)
+    stop = MaxIterations(200)
     with Runner(
         name, period=PERIOD, plan_stop=stop, executor=ImmediateExecutor(), **options
     ) as runner:

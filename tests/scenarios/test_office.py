@@ -46,7 +46,7 @@ def test_bodies_overlap_nothing(seed: int) -> None:
     assert pairs.T.tolist() == [[k, k] for k in range(len(boxes))]
 
 
-@pytest.mark.parametrize("polygons", [100, 1000, 3000])
+@pytest.mark.parametrize("polygons", [100, 1000, pytest.param(3000, marks=pytest.mark.slow)])
 def test_there_are_about_as_many_polygons_as_asked_for(polygons: int) -> None:
     counts = [len(office(seed, polygons).static.polygons) for seed in range(3)]
     assert np.mean(counts) == pytest.approx(polygons, rel=0.15 if polygons < 1000 else 0.06)

@@ -61,7 +61,8 @@ def test_the_same_seed_draws_the_same_room():
     assert one == other
 
 
-def test_too_many_objects_are_refused():
+def test_too_many_objects_are_refused(monkeypatch):
+    monkeypatch.setattr("pushplan.scenarios.rearrangement._TRIES", 10)
     for room in ((0.5, 0.5), (-1.0, -1.0)):
         with pytest.raises(ScenarioError, match="wider than"):
             generate_rearrangement(np.random.default_rng(0), robot=ROBOT, room=room)

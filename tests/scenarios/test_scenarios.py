@@ -29,8 +29,8 @@ scenarios = st.builds(
 )
 
 
-@settings(max_examples=20)
-@given(st.lists(scenarios, max_size=4))
+@settings(max_examples=12)
+@given(st.lists(scenarios, max_size=3))
 def test_yaml_file_gives_back_equal_scenarios(tmp_path_factory, items):
     path = tmp_path_factory.mktemp("scenarios") / "s.yaml"
     save_scenarios(items, path)

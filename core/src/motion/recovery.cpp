@@ -101,7 +101,7 @@ std::vector<Pose> recovery_path(const RecoveryProblem& problem) {
   };
   for (std::size_t at = 0; at < nodes.size(); ++at) {
     const Pose here = nodes[at].pose;
-    for (const DriveStep& step : problem.steps) {
+    for (const RecoveryStep& step : problem.steps) {
       const Pose pose = arc_step(here, step.distance, step.turn);
       const Index box = seen.box_of(pose);
       if (box < 0 || seen[box]) continue;

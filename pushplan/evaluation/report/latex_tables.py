@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import string
 import textwrap
@@ -36,10 +37,12 @@ _ACCENTS: dict[str, str] = _CHARACTERS["accents"]
 def latex(tables: Sequence[Table]) -> str:
     """The tables as floats, each `TEXT_WIDTH` wide at most.
 
-    Of a table that is wider, the further columns follow below, beside the first ones again. A
-    table that is longer than a page goes on in another one.
+    A label is ``tab:`` and the words of the caption with hyphens between them, and a number from
+    the second of such a name on. Of a table that is wider, the further columns follow below, beside
+    the first ones again. A table that is longer than a page goes on in another one.
     """
     blocks = [r"% \usepackage{booktabs}"]
+    labels: list[str] = []
     for table in tables:
         keys = 2 if table.headings[1:2] == ("pair",) else 1
         lines = [[_lines(cell) for cell in row] for row in (table.headings, *table.cells)]
@@ -51,6 +54,8 @@ def latex(tables: Sequence[Table]) -> str:
             block = [r"\begin{table}", r"\centering\footnotesize"]
             block.append(rf"\setlength{{\tabcolsep}}{{{_SEPARATION:g}pt}}")
             block.append(rf"\caption{{{_breakable(table.title)}{more}}}")
+            labels.append(_label(table.title, labels))
+            block.append(rf"\label{{tab:{labels[-1]}}}")
             block += [_tabular([lines[0], *rows], part, keys) for part in few]
             if table.note and number == len(pages) - 1:
                 block.append(rf"\par\smallskip\raggedright {_breakable(table.note)}.")
@@ -58,6 +63,13 @@ def latex(tables: Sequence[Table]) -> str:
             if len(blocks) % _FLOATS == 0:
                 blocks.append(r"\clearpage")
     return "\n\n".join(blocks) + "\n"
+
+
+def _label(title: str, taken: Sequence[str]) -> str:
+    """Letters and digits of a title, which no document has to escape, and a number if need be."""
+    words = re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-") or "table"
+    numbered = (f"{words}-{number}" for number in itertools.count(2))
+    return next(label for label in itertools.chain([words], numbered) if label not in taken)
 
 
 def _lines(cell: str) -> list[str]:

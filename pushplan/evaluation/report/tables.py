@@ -80,6 +80,10 @@ BRIEF_NOTE = (
     "second policy minus first on the same scenarios: mean, 95 % bootstrap interval; * where p < "
     "0.05, corrected by Holm, with 10 scenarios at least; 'differences.csv' has the rest"
 )
+_APART_NOTE = (
+    "mean and test point in different directions in {}: few large differences outweigh many small "
+    "ones in the mean, and the test goes by ranks"
+)
 GAP_NOTE = (
     "work of robot and objects, m₀ l₀ + Σ mᵢ lᵢ, of the successful episodes: mean of how much it "
     "is above the best known solution of the scenario, and above a proven bound ('pushplan "
@@ -236,6 +240,9 @@ def difference_tables(
             cells = [(names, *line) for names, line in brief.items()]
             headings = ("pair", *map(heading, metrics))
             note = BRIEF_NOTE
+        if apart := [pair for pair in mine if pair.significant and _is_mean_apart(pair)]:
+            named = (f"{heading(p.metric)} of {p.second} - {p.first}" for p in apart)
+            note = f"{note}; {_APART_NOTE.format(', '.join(named))}"
         title = f"Paired differences: {titles.get(setting, setting)}"
         tables.append(Table(title, headings, tuple(cells), note))
     return tables
@@ -250,6 +257,12 @@ def on_few_lines(tables: Sequence[Table]) -> list[Table]:
             table = replace(table, cells=tuple(cells))
         found.append(table)
     return found
+
+
+def _is_mean_apart(pair: PairedDifference) -> bool:
+    """True if the mean difference says better where the test says worse, or the other way round."""
+    sign = 1.0 if METRICS[pair.metric].higher_is_better else -1.0
+    return sign * pair.difference.mean * pair.effect < 0.0
 
 
 def _more(pair: PairedDifference) -> str:

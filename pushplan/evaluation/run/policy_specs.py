@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import inspect
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, is_dataclass
+from dataclasses import dataclass, field, is_dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, cast
@@ -23,7 +24,15 @@ from pushplan.evaluation.store.source_digests import (
 )
 from pushplan.imports.named_objects import load_object, names_to_give
 from pushplan.imports.on_demand import missing
-from pushplan.world import InvalidInputError, Planner, Policy, PushplanError, UnknownNameError
+from pushplan.world import (
+    Deadline,
+    InvalidInputError,
+    Planner,
+    Policy,
+    PushplanError,
+    Stop,
+    UnknownNameError,
+)
 
 _LABEL = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.+@-]{0,63}")
 
@@ -132,7 +141,7 @@ class PolicySpec:
         """
         with _saying_what_fails("policy", self.label):
             if not self.is_ours:
-                return as_policy(self._made_object(), self.label)
+                return as_policy(self._made_object(), self.label, self.options.get("stop"))
             if self.network is not None:
                 from pushplan.learned import load_policy
 
@@ -167,7 +176,42 @@ class PolicySpec:
         source: Any = self.source
         if isinstance(source, str):
             source = load_object(source)
-        return source(**self.options)
+        options = dict(self.options)
+        if "stop" in options and not _takes_stop(source):
+            del options["stop"]  # a planner gets it with each call
+        return source(**options)
+
+
+def _takes_stop(source: Any) -> bool:
+    parameters = inspect.signature(source).parameters
+    return "stop" in parameters or any(p.kind is p.VAR_KEYWORD for p in parameters.values())
+
+
+def with_deadline(spec: PolicySpec, seconds: float) -> PolicySpec:
+    """The policy with a wall-clock limit of each planning call, or as it is if it takes none.
+
+    Args:
+        spec: a policy of ours, or a class or function of a user's that gives a policy or planner.
+        seconds: the limit [s].
+
+    Raises:
+        InvalidInputError: if the limit is not a positive number.
+        UnusablePolicyError: if the policy cannot be made.
+    """
+    limited = replace(spec, options={**spec.options, "stop": Deadline(seconds)})
+    if spec.network is not None:
+        return spec
+    try:
+        made = limited.make()
+    except UnusablePolicyError as error:
+        if spec.is_ours and isinstance(error.__cause__, UnknownNameError):
+            return spec
+        raise
+    source: Any = spec.source
+    if isinstance(source, str) and not spec.is_ours:
+        source = load_object(source)
+    takes = spec.is_ours or _takes_stop(source) or getattr(made, "stop", None) is not None
+    return limited if takes else spec
 
 
 def described(value: Any, depth: int = 8) -> str:
@@ -240,8 +284,13 @@ def _saying_what_fails(kind: str, label: str) -> Iterator[None]:
         raise UnusablePolicyError(f"{kind} {label!r} cannot be made: {said}") from error
 
 
-def as_policy(thing: Any, label: str) -> Policy:
+def as_policy(thing: Any, label: str, stop: Stop | None = None) -> Policy:
     """A policy as it is; a planner, or an object with ``predict``, wrapped as one.
+
+    Args:
+        thing: the object.
+        label: what errors call it.
+        stop: of each call of a planner; its own default if None.
 
     Raises:
         InvalidInputError: if it is neither.
@@ -251,7 +300,7 @@ def as_policy(thing: Any, label: str) -> Policy:
     if callable(getattr(thing, "plan", None)):
         from pushplan.planners.following.plan_follower import policy_for
 
-        return policy_for(thing)
+        return policy_for(thing, stop)
     if callable(getattr(thing, "predict", None)):
         from pushplan.learned import ObjectPolicy
 

@@ -287,8 +287,12 @@ class PlanFollower:
         return latency
 
 
-def policy_for(planner: Planner) -> PlanFollower:
+def policy_for(planner: Planner, stop: Stop | None = None) -> PlanFollower:
     """The default policy around a planner: follow its plans, plan again when they do not fit.
+
+    Args:
+        planner: whose plans are followed.
+        stop: stop rule of each planning call; the planner's own default if None.
 
     Raises:
         InvalidInputError: if the object has no ``plan`` method.
@@ -297,4 +301,4 @@ def policy_for(planner: Planner) -> PlanFollower:
         raise InvalidInputError(
             f"a planner needs a method plan(world, *, stop, rng), {type(planner).__name__} has none"
         )
-    return PlanFollower(planner)
+    return PlanFollower(planner, stop=stop)

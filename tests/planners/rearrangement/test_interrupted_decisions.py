@@ -60,13 +60,14 @@ def test_a_first_push_is_found_long_before_all_of_them_are_simulated(ticks):
     assert here.budget.used < 0.6 * whole.budget.used
 
 
+@pytest.mark.slow
 def test_a_search_for_relocations_goes_on_where_it_was_interrupted():
     here = replace(scene([(0.0, -4.49, 0.0)]), cache=RolloutCache())
     whole = RelocationSearch(here, 0, approach_tree(here), False).run()
     search = RelocationSearch(here, 0, approach_tree(here), False)
     calls = 0
     while search.interrupted:
-        here.budget.start(MaxIterations(40), math.inf)
+        here.budget.start(MaxIterations(400), math.inf)
         found = search.run()
         calls += 1
         assert calls < 1000

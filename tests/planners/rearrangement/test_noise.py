@@ -49,7 +49,10 @@ def approaches(position: float, degrees: float, seed: int) -> tuple[int, float]:
     return taken_up, driven
 
 
-@pytest.mark.parametrize(("position", "degrees"), NOISES)
+@pytest.mark.parametrize(
+    ("position", "degrees"),
+    [*NOISES[:1], *(pytest.param(*noise, marks=pytest.mark.slow) for noise in NOISES[1:])],
+)
 def test_a_box_that_stands_still_is_approached_once(position, degrees):
     _, exact = approaches(0.0, 0.0, 0)
     for seed in range(4):

@@ -15,7 +15,7 @@ inline constexpr double kRecoveryStep = 0.08;
 /// the bounds and free.
 bool can_turn(Vec2 centre, double size, const ConvexObstacles& obstacles);
 
-struct DriveStep {
+struct RecoveryStep {
   double distance;  // [m], negative for back
   double turn;      // [rad]
 };
@@ -23,7 +23,7 @@ struct DriveStep {
 /// Start of a recovery path, and the obstacles that it must not touch.
 struct RecoveryProblem {
   Pose start;
-  std::span<const DriveStep> steps;  // that the robot may take
+  std::span<const RecoveryStep> steps;  // that the robot may take
   Footprint body;
   Footprint grown;  // by the distance to keep from what it does not touch
   ConvexObstacles obstacles;

@@ -7,7 +7,7 @@
 namespace pushplan {
 
 Index find_connections(double heading, double target, const ConnectionLimits& limits,
-                       std::span<Connection> out) {
+                       std::span<LatticeConnection> out) {
   const double most_turn = std::abs(wrap_angle(target - heading)) + limits.slack;
   const double c = std::cos(heading);
   const double s = std::sin(heading);

@@ -15,7 +15,7 @@
 namespace pushplan {
 
 /// A path from the origin to a lattice point; lengths in lattice steps.
-struct Connection {
+struct LatticeConnection {
   double length;
   Vec2 end;
   std::array<Arc, 3> arcs;
@@ -31,7 +31,7 @@ struct ConnectionLimits {
 /// Finds the Dubins paths without needless turns from the origin to all points at a heading
 /// `target` that lie ahead. Returns their number; those are left out for which `out` has no room.
 Index find_connections(double heading, double target, const ConnectionLimits& limits,
-                       std::span<Connection> out);
+                       std::span<LatticeConnection> out);
 
 /// Finds where the robot's origin is along primitives, each of three arcs [steps].
 void primitive_boxes(std::span<const double> headings,          // (P,) at their starts [rad]
