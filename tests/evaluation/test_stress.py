@@ -25,7 +25,12 @@ def test_a_policy_that_stands_it_misses_nothing():
     assert noisy.scores["E_nav"] != calm.scores["E_nav"]
     assert noisy.kept["E_nav"] == noisy.scores["E_nav"] / calm.scores["E_nav"]
     assert sheet.missed == ()
-    assert stress("straight", "maze-3d-3", **given) == sheet
+
+
+@pytest.mark.slow
+def test_a_sheet_repeats():
+    given = {"conditions": ["noise-1cm-2deg"], "episodes": 1, "seed": 2, "workers": 0}
+    assert stress("straight", "maze-3d-3", **given) == stress("straight", "maze-3d-3", **given)
 
 
 def test_what_is_missed_is_said_and_why():
