@@ -112,7 +112,7 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         if observation is None or isinstance(observation, str):
             observation = self.task.observation(observation or kind.observations[0])
         if not hasattr(observation, "observe"):
-            raise UnknownNameError(f"observation of {task}", observation, kind.observations)
+            raise UnknownNameError(f"observation of {task}", observation, kind.observation_names())
         self._builder: ObservationBuilder = observation
         if seed is not None:
             seed = integer("seed", seed, low=0)

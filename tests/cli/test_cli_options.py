@@ -41,7 +41,7 @@ def test_any_observation_of_the_task_can_be_asked_for(
     assert main([*arguments, "--observation", "image", "--out", str(out)]) == 0
     assert out.exists()
     assert main([*RUN, "--observation", "spatal"]) == 2
-    assert "valid: image, spatial, state" in capsys.readouterr().err
+    assert "valid: image, lidar, spatial, state" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("command", [["run", "--policy"], ["bench", "--policies"]])

@@ -28,7 +28,7 @@ from pushplan.world import (
         ({"preset": []}, "unknown preset of box_delivery"),
         ({"preset": 3}, "valid: benchmark, original, testbed"),
         ({"action": 3}, "unknown action"),
-        ({"observation": 3}, "valid: image, spatial, state"),
+        ({"observation": 3}, "valid: image, lidar, spatial, state"),
         ({"variations": 5}, "variations must be a mapping, got 5"),
         ({"seed": "a"}, "seed must be a whole number, got 'a'"),
         ({"seed": -1}, "seed must be at least 0"),

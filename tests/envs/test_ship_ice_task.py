@@ -280,7 +280,7 @@ def test_observations(preset):
     assert (np.diff(goal[:, 0].astype(int)) >= 0).all()  # nearer further up
     state = ship.observation("state").observe(world)
     assert state.shape == (6 + 5 * 20,)
-    with pytest.raises(UnknownNameError, match="valid: image, state"):
+    with pytest.raises(UnknownNameError, match="valid: image, lidar, state"):
         ship.observation("imgae")
 
 

@@ -287,6 +287,11 @@ class Task(ABC):
             return StepOutcome(reward, False, "time_limit", truncated=True)
         return StepOutcome(reward, False)
 
+    @classmethod
+    def observation_names(cls) -> tuple[str, ...]:
+        """Names of all observations: those of the task, and the one that every task has."""
+        return (*cls.observations, "lidar")
+
     def observation(self, name: str) -> ObservationBuilder:
         """The builder of an observation by name.
 
@@ -299,8 +304,9 @@ class Task(ABC):
             )
             return builder
         if name not in self.observations:
-            valid = (*self.observations, "lidar")
-            raise UnknownNameError(f"observation of task {self.name!r}", name, valid)
+            raise UnknownNameError(
+                f"observation of task {self.name!r}", name, self.observation_names()
+            )
         if name == "state":
             return StateObservation(max_objects=self.state_objects)
         return self._image(name)
