@@ -134,6 +134,8 @@ class FeatureObservation(LimitedVector, CheckedFields):
         else:
             ways = [_way_of_object(world, *one) for one in zip(poses, at.tolist(), strict=True)]
             waiting = np.array([length > 0.0 for _, length in ways])
+            if isinstance(goal, ObjectGoals):
+                waiting &= ~world.completed
             chosen = np.lexsort((away, ~waiting))[: self.objects]
             for row, k in enumerate(chosen.tolist()):
                 direction, length = ways[k]
