@@ -115,8 +115,8 @@ def test_places_are_told_in_the_frames_of_their_objects():
     # a T that is turned by a quarter is seen to be
     env = PushEnv(task="rearrange", variations={"objects": 1, "shape": "t"})
     env.reset(seed=1004)
-    pose = env.world.movables.poses + [0.0, 0.0, np.pi / 2]
-    one, other = (view.observe(w)[10:25] for w in (env.world, env.world.moved(movable_poses=pose)))
+    turned = env.world.moved(movable_poses=env.world.movables.poses + np.array([0, 0, np.pi / 2]))
+    one, other = (view.observe(world)[10:25] for world in (env.world, turned))
     assert other[2:4] == pytest.approx([-one[3], one[2]], abs=1e-5)
     assert other[13:] == pytest.approx([one[14], -one[13]], abs=1e-5)
 

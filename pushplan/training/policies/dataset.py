@@ -191,11 +191,10 @@ class _Part(NamedTuple):
         if not len(moved):
             return None
         end = int(rng.choice(moved)) + 1
-        ids = self.worlds[0].movables.ids
-        places = replace(
-            goal, poses=poses[end][[int(np.flatnonzero(ids == i)[0]) for i in goal.ids]]
-        )
-        worlds = [replace(world, goal=places) for world in self.worlds[: end + 1]]
+        ids = self.worlds[0].movables.ids.tolist()
+        of_places = [ids.index(label) for label in goal.ids.tolist()]
+        later = replace(goal, poses=poses[end][of_places])
+        worlds = [replace(world, goal=later) for world in self.worlds[: end + 1]]
         rows = [(action, 0.0, False, False, executed) for action, *_, executed in self.rows[:end]]
         return _Part(worlds, rows)
 
