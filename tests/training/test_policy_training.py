@@ -147,6 +147,23 @@ class TestTraining:
         assert np.array_equal(behaviour(whole), behaviour(again))
 
     @pytest.mark.slow
+    def test_pushes_to_places_are_cloned(self, tmp_path):
+        from pushplan.planners import make_policy
+
+        shipped = config_named("rearrange", "flow").to_dict()
+        scenarios = [{**shipped["scenarios"][0], "time_limit": 20.0}]
+        sizes = {"scenarios": scenarios, "steps": 64, "chunk": 32, "options": TINY["flow"]}
+        config = TrainingConfig.from_dict({**shipped, **sizes})
+        teacher, found = make_policy("gtsp-mpc"), tmp_path / "data"
+        options = {"noise": 0.05, "afresh": True, "hindsight": 1}
+        record(config, teacher, "gtsp-mpc", found, episodes=1, **options)
+        policy = OnnxPolicy(trained(config, tmp_path / "run", found))
+        env = PushEnv(task="rearrange", variations=scenarios[0], observation=policy.observation)
+        seen, _ = env.reset(seed=1)
+        policy.reset(env.world, np.random.default_rng(0))
+        assert env.action_space.contains(policy.act(env.world, seen).astype(np.float32))
+
+    @pytest.mark.slow
     def test_what_comes_out_runs_without_a_learning_library(self, tmp_path, data):
         path = trained(tiny("bc"), tmp_path / "run", data)
         code = f"""

@@ -220,8 +220,10 @@ def _run(
                 yield part
                 part = _Part([], [])
         asked = not (afresh and held)
-        action = env.encode(policy.act(env.world, seen)) if asked else disturbed
-        executed: NDArray[Any] = action
+        action: NDArray[Any] = disturbed
+        if asked:
+            action = env.encode(policy.act(env.world, seen))
+        executed = action
         if held:
             executed = disturbed
             if driver is not None:
