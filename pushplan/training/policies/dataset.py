@@ -104,8 +104,8 @@ def record(
         afresh: for a policy that follows a plan. Where a disturbance ends it is reset, and another
             episode of the data set begins; the disturbance itself is left out.
         hindsight: how many more episodes are made of each one in which objects have places of
-            their own, as if these had been where the objects came to be at some later step: an
-            action leads there too (Andrychowicz et al. 2017, arXiv 1707.01495). Without rewards.
+            their own, as if these had been where the objects came to be at some later step: its
+            actions lead there too (Andrychowicz et al. 2017, arXiv 1707.01495). Without rewards.
 
     Raises:
         InvalidInputError: if the folder holds something, or a number makes no sense.
@@ -172,7 +172,7 @@ class _Part(NamedTuple):
     success: bool = False
 
     def arrays(self, builder: ObservationBuilder) -> dict[str, Any]:
-        """What is stored of it."""
+        """Its arrays, as they are stored."""
         columns = zip((*ARRAYS[1:], _EXECUTED), zip(*self.rows, strict=True), strict=True)
         arrays = {
             name: np.array(values, np.bool_ if name in _TRUTHS else np.float32)
