@@ -127,12 +127,15 @@ def _show_progress(logger: Any) -> None:
 
 def export(options: argparse.Namespace) -> int:
     """Run the policy and write its episodes."""
+    import logging
+
     from pushplan.evaluation import parse_policy
     from pushplan.training.policies.config import config_named, read_config
     from pushplan.training.policies.dataset import read_metadata, record, to_minari
     from pushplan.world import InvalidInputError
 
     check_directory(options.out)
+    _show_progress(logging.getLogger("pushplan.training"))
     given = options.config
     if given is None:
         config = config_named(options.task, "bc")
@@ -156,6 +159,8 @@ def export(options: argparse.Namespace) -> int:
         episodes=options.episodes,
         noise=options.noise,
         hold=options.hold,
+        afresh=options.afresh,
+        hindsight=options.hindsight,
         **more,
     )
     about = read_metadata(folder)

@@ -61,7 +61,10 @@ def world_length(world):
     return graph.to_goal(world.robot_pose[:2], world.goal).length
 
 
-@pytest.mark.parametrize("task", ["maze", "ship_ice", "box_delivery", "area_clearing"])
+TASKS = ["maze", "ship_ice", "box_delivery", "area_clearing", "rearrange"]
+
+
+@pytest.mark.parametrize("task", TASKS)
 def test_every_task_observes_it(task):
     env = PushEnv(task=task, observation=FeatureObservation())
     seen, _ = env.reset(seed=1001)
@@ -82,6 +85,40 @@ def test_objects_that_have_to_be_moved_come_first():
     rows = rows[10:].reshape(10, 9)
     assert rows[-1, 7] == 0.0 and (rows[:-1, 7] > 0.0).all()
     assert np.hypot(*rows[:-1, 5:7].T) == pytest.approx(1.0)
+
+
+def test_places_are_told_in_the_frames_of_their_objects():
+    env = PushEnv(task="rearrange", variations={"objects": 3, "obstacles": 1})
+    env.reset(seed=1003)
+    world = env.world
+    poses = np.array(world.movables.poses)
+    poses[1] = world.goal.poses[1] + [0.0, 0.0, np.pi / 2]  # there, as a square
+    world = world.moved(movable_poses=poses)
+    view = FeatureObservation(rays=0, objects=4, places=True)
+    rows = view.observe(world)[10:].reshape(4, 15)
+    nearest = np.argsort(np.hypot(*(poses - world.robot_pose)[:, :2].T))
+    order = [k for k in nearest if k in (0, 2)] + [k for k in nearest if k in (1, 3)]
+    for row, k in zip(rows, order, strict=True):
+        assert np.hypot(*row[9:11]) == pytest.approx(np.hypot(*row[:2]), abs=1e-6)
+        if k == 3:  # has no place
+            assert not row[[5, 6, 7, 11, 12, 13, 14]].any()
+            continue
+        turn = np.arctan2(row[14], row[13])
+        assert abs(turn) <= np.pi / 4 + 1e-6
+        x, y, heading = world.goal.poses[k]
+        at = heading - turn  # the object, up to quarters of a turn
+        assert np.remainder(4 * (at - poses[k, 2]) + 1.0, 2 * np.pi) == pytest.approx(1.0, abs=1e-4)
+        c, s = np.cos(at), np.sin(at)
+        there = poses[k, :2] + 6.0 * np.array([[c, -s], [s, c]]) @ row[11:13]
+        assert there == pytest.approx([x, y], abs=1e-5)
+        assert row[7] * 6.0 == pytest.approx(np.hypot(x - poses[k, 0], y - poses[k, 1]), abs=1e-5)
+    # a T that is turned by a quarter is seen to be
+    env = PushEnv(task="rearrange", variations={"objects": 1, "shape": "t"})
+    env.reset(seed=1004)
+    turned = env.world.moved(movable_poses=env.world.movables.poses + np.array([0, 0, np.pi / 2]))
+    one, other = (view.observe(world)[10:25] for world in (env.world, turned))
+    assert other[2:4] == pytest.approx([-one[3], one[2]], abs=1e-5)
+    assert other[13:] == pytest.approx([one[14], -one[13]], abs=1e-5)
 
 
 @pytest.mark.parametrize("options", [{"rays": -1}, {"objects": 1.5}, {"range": 0.0}])

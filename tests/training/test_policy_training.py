@@ -63,7 +63,7 @@ TINY = {
         "follow": 0.01,
     },
     "bc": {"batch": 16, "widths": [8]},
-    "flow": {"batch": 16, "widths": [8, 8], "euler": 2},
+    "flow": {"batch": 16, "widths": [8, 8], "euler": 2, "waves": 2},
 }
 
 
@@ -145,6 +145,23 @@ class TestTraining:
         assert [row[:1] + row[2:] for row in rows[0]] == [row[:1] + row[2:] for row in rows[1]]
         again = trained(config, tmp_path / "parts", data, resume=True)  # nothing is left to do
         assert np.array_equal(behaviour(whole), behaviour(again))
+
+    @pytest.mark.slow
+    def test_pushes_to_places_are_cloned(self, tmp_path):
+        from pushplan.planners import make_policy
+
+        shipped = config_named("rearrange", "flow").to_dict()
+        scenarios = [{**shipped["scenarios"][0], "time_limit": 20.0}]
+        sizes = {"scenarios": scenarios, "steps": 64, "chunk": 32, "options": TINY["flow"]}
+        config = TrainingConfig.from_dict({**shipped, **sizes})
+        teacher, found = make_policy("gtsp-mpc"), tmp_path / "data"
+        options = {"noise": 0.05, "afresh": True, "hindsight": 1}
+        record(config, teacher, "gtsp-mpc", found, episodes=1, **options)
+        policy = OnnxPolicy(trained(config, tmp_path / "run", found))
+        env = PushEnv(task="rearrange", variations=scenarios[0], observation=policy.observation)
+        seen, _ = env.reset(seed=1)
+        policy.reset(env.world, np.random.default_rng(0))
+        assert env.action_space.contains(policy.act(env.world, seen).astype(np.float32))
 
     @pytest.mark.slow
     def test_what_comes_out_runs_without_a_learning_library(self, tmp_path, data):
@@ -386,6 +403,60 @@ class TestDataset:
         driven = np.flatnonzero(found.executed != found.actions)
         own = np.isin(found.executed.ravel(), np.float32([0.01, 0.02, 0.03]))
         assert len(driven) >= 3 and own[driven].all()
+
+    def test_a_policy_begins_afresh_after_each_disturbance(self, tmp_path):
+        begun = []
+
+        class Ahead:
+            def reset(self, world, rng):
+                begun.append(world.time)
+
+            def act(self, world, seen):
+                return np.array([0.02])
+
+        options = {"noise": 0.1, "hold": 3, "afresh": True}
+        folder = record(tiny("bc"), Ahead(), "ahead", tmp_path / "x", episodes=1, **options)
+        found = list(episodes(folder))
+        assert 3 <= len(found) == read_metadata(folder)["total_episodes"] <= len(begun)
+        assert begun[0] == 0.0 < begun[1] < begun[2]
+        for one in found:
+            assert np.array_equal(one.executed, one.actions)
+            assert (one.actions == np.float32(0.02)).all()
+            ends = one.terminations | one.truncations
+            assert ends[-1] and not ends[:-1].any()
+
+    def test_in_hindsight_objects_belong_where_they_came_to_be(self, tmp_path):
+        class Chasing:
+            actions = ("velocity",)
+
+            def reset(self, world, rng):
+                pass
+
+            def act(self, world, seen):
+                x, y = (world.movables.poses[0] - world.robot_pose)[:2]
+                turn = np.arctan2(y, x) - world.robot_pose[2]
+                return np.array([1.0, 0.5 * np.arctan2(np.sin(turn), np.cos(turn))])
+
+        config = tiny(
+            "bc",
+            task="rearrange",
+            scenarios=[{"objects": 1, "shape": "t", "time_limit": 15.0}],
+            observation={**SMALL, "places": True},
+            action={"mode": "velocity"},
+        )
+        folder = record(config, Chasing(), "chasing", tmp_path / "x", episodes=1, hindsight=2)
+        whole, *others = episodes(folder)
+        assert len(others) == 2
+        for one in others:
+            steps = len(one.actions)
+            assert 0 < steps <= len(whole.actions)
+            assert np.array_equal(one.actions, whole.actions[:steps])
+            place = one.observations[:, -4:]  # in the object's frame, with cosine and sine
+            assert place[-1] == pytest.approx([0.0, 0.0, 1.0, 0.0], abs=1e-6)
+            assert np.abs(place[-2] - place[-1]).max() > 1e-6
+            seen = [10 + 8, 10 + 8 + 1, -6, -5]  # object and robot are where they were
+            assert np.array_equal(one.observations[:, seen], whole.observations[: steps + 1, seen])
+        assert not read_metadata(folder)["successes"]
 
     def test_what_a_disturbance_leaves_of_a_chunk(self):
         wanted = np.arange(6, dtype=np.float32)[:, None]

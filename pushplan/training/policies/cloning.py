@@ -42,9 +42,9 @@ class Imitator:
         shape = env.observation_space.shape
         outputs = env.action.shape
         if isinstance(options, FlowOptions):
-            network: Any = FlowPolicy(shape, options.widths, outputs, options.euler)
+            network: Any = FlowPolicy(shape, options.widths, outputs, options.euler, options.waves)
         else:
-            network = DirectPolicy(shape, options.widths, outputs[0])
+            network = DirectPolicy(shape, options.widths, outputs[0], options.waves)
         self.policy = network.to(device)
         self.optimizer = torch.optim.AdamW(
             network.parameters(), lr=options.rate, weight_decay=options.decay

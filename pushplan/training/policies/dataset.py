@@ -10,11 +10,12 @@ disturbed. No pickles. `to_minari` makes a data set of Minari's own.
 from __future__ import annotations
 
 import json
+import logging
 import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,14 +28,25 @@ from pushplan.learned.specification import RobotSpec
 from pushplan.observation import ObservationBuilder
 from pushplan.training.policies.config import TrainingConfig
 from pushplan.training.policies.environment import TRAINING_SEEDS, environments
-from pushplan.world import ChoosesObservation, InvalidInputError, SchemaError, stream
+from pushplan.world import (
+    ChoosesObservation,
+    InvalidInputError,
+    ObjectGoals,
+    SchemaError,
+    World,
+    stream,
+)
 from pushplan.world.checks import integer, number
 from pushplan.world.policy_abilities import action_modes
+
+log = logging.getLogger(__name__)
 
 SCHEMA = "pushplan-dataset/1"
 METADATA = "metadata.json"
 ARRAYS = ("observations", "actions", "rewards", "terminations", "truncations")
 _EXECUTED = "executed"
+_MOVED = 1e-4
+"""By more has an object moved in a step [m, rad]."""
 _TRUTHS = ("terminations", "truncations")
 _KEYS = (
     *("format", "task", "simulator", "preset", "scenarios", "policy", "action_mode", "observation"),
@@ -67,6 +79,8 @@ def record(
     hold: int = 4,
     driver: Any = None,
     driver_label: str | None = None,
+    afresh: bool = False,
+    hindsight: int = 0,
 ) -> Path:
     """Run a policy and write what it saw and wanted.
 
@@ -87,6 +101,11 @@ def record(
             shows what ``policy`` does where the driver gets to (DAgger, Ross et al. 2011, arXiv
             1011.0686).
         driver_label: what the data set calls it.
+        afresh: for a policy that follows a plan. Where a disturbance ends it is reset, and another
+            episode of the data set begins; the disturbance itself is left out.
+        hindsight: how many more episodes are made of each one in which objects have places of
+            their own, as if these had been where the objects came to be at some later step: its
+            actions lead there too (Andrychowicz et al. 2017, arXiv 1707.01495). Without rewards.
 
     Raises:
         InvalidInputError: if the folder holds something, or a number makes no sense.
@@ -95,6 +114,7 @@ def record(
     integer("first_seed", first_seed, low=0)
     number("noise", noise, low=0.0, high=1.0)
     integer("hold", hold, low=1)
+    integer("hindsight", hindsight, low=0)
     folder = Path(folder)
     if folder.exists() and any(folder.iterdir()):
         raise InvalidInputError(f"{folder} is not empty")
@@ -104,13 +124,20 @@ def record(
         wanted = policy.observation
     envs = environments(config, wanted, action_modes(policy) or None)
     (folder / "data").mkdir(parents=True, exist_ok=True)
-    steps = successes = 0
+    steps = successes = count = 0
     for index in range(episodes):
         env = envs[index % len(envs)]
-        arrays, success = _run(env, policy, driver, builder, noise, hold, first_seed + index)
-        steps += len(arrays["actions"])
-        successes += success
-        np.savez_compressed(folder / "data" / f"episode_{index:05d}.npz", **arrays)
+        seed = first_seed + index
+        for part in _run(env, policy, driver, noise, hold, seed, afresh):
+            successes += part.success
+            rng = stream(seed, f"hindsight {len(part.rows)}")
+            for each in (part, *(part.hindsight(rng) for _ in range(hindsight))):
+                if each is not None:
+                    arrays = each.arrays(builder)
+                    np.savez_compressed(folder / "data" / f"episode_{count:05d}.npz", **arrays)
+                    count += 1
+                    steps += len(each.rows)
+        log.info("%d of %d starts: %d steps, %d successes", index + 1, episodes, steps, successes)
     env = envs[0]
     about = {
         "format": SCHEMA,
@@ -123,7 +150,7 @@ def record(
         "observation": builder_to_dict(builder),
         "robot": vars(RobotSpec.of(env.task.robot)),
         "control_step": env.task.control_step,
-        "total_episodes": episodes,
+        "total_episodes": count,
         "total_steps": steps,
         "successes": successes,
         "first_seed": first_seed,
@@ -137,47 +164,81 @@ def record(
     return folder
 
 
+class _Part(NamedTuple):
+    """An episode of a data set before it is observed."""
+
+    worlds: list[World]  # (T + 1)
+    rows: list[tuple[Any, ...]]  # (T) in the order of the arrays
+    success: bool = False
+
+    def arrays(self, builder: ObservationBuilder) -> dict[str, Any]:
+        """Its arrays, as they are stored."""
+        columns = zip((*ARRAYS[1:], _EXECUTED), zip(*self.rows, strict=True), strict=True)
+        arrays = {
+            name: np.array(values, np.bool_ if name in _TRUTHS else np.float32)
+            for name, values in columns
+        }
+        arrays["truncations"][-1] |= not arrays["terminations"][-1]
+        return {"observations": np.stack([builder.observe(w) for w in self.worlds]), **arrays}
+
+    def hindsight(self, rng: np.random.Generator) -> _Part | None:
+        """The beginning, with the places where objects came to be; None if none has moved."""
+        goal = self.worlds[0].goal
+        if not isinstance(goal, ObjectGoals):
+            return None
+        poses = np.stack([world.movables.poses for world in self.worlds])
+        moved = np.flatnonzero((np.abs(np.diff(poses, axis=0)) > _MOVED).any(axis=(1, 2)))
+        if not len(moved):
+            return None
+        end = int(rng.choice(moved)) + 1
+        ids = self.worlds[0].movables.ids.tolist()
+        of_places = [ids.index(label) for label in goal.ids.tolist()]
+        later = replace(goal, poses=poses[end][of_places])
+        worlds = [replace(world, goal=later) for world in self.worlds[: end + 1]]
+        rows = [(action, 0.0, False, False, executed) for action, *_, executed in self.rows[:end]]
+        return _Part(worlds, rows)
+
+
 def _run(
-    env: PushEnv,
-    policy: Any,
-    driver: Any,
-    builder: ObservationBuilder,
-    noise: float,
-    hold: int,
-    seed: int,
-) -> tuple[dict[str, Any], bool]:
-    """The arrays of an episode, and its success."""
+    env: PushEnv, policy: Any, driver: Any, noise: float, hold: int, seed: int, afresh: bool
+) -> Iterator[_Part]:
+    """Run an episode; if the policy begins afresh, give its parts between disturbances."""
     seen, _ = env.reset(seed=seed)
     policy.reset(env.world, stream(seed, "policy"))
     rng = stream(seed, "noise")
-    observed = [builder.observe(env.world)]
-    rows: list[tuple[Any, ...]] = []
+    part = _Part([env.world], [])
     held = 0
     disturbed = np.zeros(0)
     over = False
     while not over:
-        action = env.encode(policy.act(env.world, seen))
         if held == 0 and noise and rng.random() < noise:
             held = hold
-            disturbed = rng.uniform(-1.0, 1.0, action.shape)
+            disturbed = rng.uniform(-1.0, 1.0, env.action_space.shape)
             if driver is not None:
                 driver.reset(env.world, stream(seed, "driver"))
-        executed: NDArray[Any] = action
+            if afresh and part.rows:
+                yield part
+                part = _Part([], [])
+        asked = not (afresh and held)
+        action: NDArray[Any] = disturbed
+        if asked:
+            action = env.encode(policy.act(env.world, seen))
+        executed = action
         if held:
             executed = disturbed
             if driver is not None:
                 executed = env.encode(driver.act(env.world))
         held = max(0, held - 1)
         seen, reward, terminated, truncated, info = env.step(executed)
-        observed.append(builder.observe(env.world))
-        rows.append((action, reward, terminated, truncated, executed))
         over = terminated or truncated
-    columns = zip((*ARRAYS[1:], _EXECUTED), zip(*rows, strict=True), strict=True)
-    arrays = {
-        name: np.array(values, np.bool_ if name in _TRUTHS else np.float32)
-        for name, values in columns
-    }
-    return {"observations": np.stack(observed), **arrays}, bool(info["success"])
+        if asked:
+            part.worlds.append(env.world)
+            part.rows.append((action, reward, terminated, truncated, executed))
+        elif not held and not over:
+            policy.reset(env.world, stream(seed, "policy"))
+            part = _Part([env.world], [])
+    if part.rows:
+        yield part._replace(success=bool(info["success"]))
 
 
 def read_metadata(folder: str | Path) -> dict[str, Any]:

@@ -25,15 +25,21 @@ class FlowPolicy(nn.Module):
         widths: of the hidden layers of the velocity.
         chunk: actions of a chunk, and elements of an action.
         euler: steps of Euler's method.
+        waves: of a vector, see `Encoder`.
     """
 
     def __init__(
-        self, shape: tuple[int, ...], widths: Sequence[int], chunk: tuple[int, ...], euler: int
+        self,
+        shape: tuple[int, ...],
+        widths: Sequence[int],
+        chunk: tuple[int, ...],
+        euler: int,
+        waves: int,
     ) -> None:
         super().__init__()
         self.chunk = chunk
         self.euler = euler
-        self.encoder = Encoder(shape)
+        self.encoder = Encoder(shape, waves)
         size = math.prod(chunk)
         self.noise = (size,)
         self.of_seen = nn.Linear(self.encoder.outputs, widths[0])

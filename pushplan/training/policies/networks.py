@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
@@ -44,13 +45,21 @@ def layers(inputs: int, widths: Sequence[int], outputs: int) -> nn.Sequential:
 
 
 class Encoder(nn.Module):
-    """Observation to vector: images in [0, 255] by a `SmallEncoder`, vectors as they are."""
+    """Observation to vector: images in [0, 255] by a `SmallEncoder`, vectors with their waves.
 
-    def __init__(self, shape: tuple[int, ...]) -> None:
+    Args:
+        shape: of an observation.
+        waves: for each number x of a vector sin and cos of pi x, 2 pi x, 4 pi x and so on are added
+            to it, so many of each. Perceptrons are slow to learn what changes within a small part
+            of the range (Tancik et al. 2020, arXiv 2006.10739).
+    """
+
+    def __init__(self, shape: tuple[int, ...], waves: int = 0) -> None:
         super().__init__()
         self.is_image = len(shape) == 3
         self.layers: nn.Module = nn.Identity()
-        self.outputs = shape[0]
+        self.factors = [math.pi * 2.0**i for i in range(waves)]
+        self.outputs = shape[0] * (1 + 2 * waves)
         if self.is_image:
             self.layers = SmallEncoder(shape[0], (shape[1], shape[2]))
             self.outputs = 128
@@ -60,6 +69,9 @@ class Encoder(nn.Module):
         seen = observations.float()
         if self.is_image:
             seen = seen / IMAGE_SCALE
+        elif self.factors:
+            angles = [factor * seen for factor in self.factors]
+            seen = torch.cat([seen, *map(torch.sin, angles), *map(torch.cos, angles)], dim=1)
         encoded: Tensor = self.layers(seen)
         return encoded
 
@@ -67,9 +79,11 @@ class Encoder(nn.Module):
 class DirectPolicy(nn.Module):
     """Observation to action, for behaviour cloning; images in [0, 255] or vectors."""
 
-    def __init__(self, shape: tuple[int, ...], widths: Sequence[int], outputs: int) -> None:
+    def __init__(
+        self, shape: tuple[int, ...], widths: Sequence[int], outputs: int, waves: int
+    ) -> None:
         super().__init__()
-        self.encoder = Encoder(shape)
+        self.encoder = Encoder(shape, waves)
         self.body = layers(self.encoder.outputs, widths, outputs)
 
     def forward(self, observations: Tensor) -> Tensor:

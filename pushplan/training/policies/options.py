@@ -11,6 +11,7 @@ from pushplan.world.checked_fields import (
     Fraction,
     Limits,
     NonNegativeFloat,
+    NonNegativeInt,
     PositiveFloat,
     PositiveFraction,
     PositiveInt,
@@ -99,6 +100,7 @@ class BcOptions(CheckedFields):
     held_out: Fraction = 0.1  # fraction of the episodes that only measure the error
     widths: Widths = (128, 128)  # of the hidden layers
     decay: NonNegativeFloat = 1e-5  # of the weights
+    waves: NonNegativeInt = 0  # sines and cosines of each number of a vector that the network sees
 
 
 @dataclass(frozen=True)
