@@ -74,7 +74,7 @@ def main() -> None:
     head("objects", "seen", "update p50 [ms]", "p99", "worst", "sensors p50 [ms]", "polygons")
     for count in options.objects:
         world = hall(count, np.random.default_rng(options.seed))
-        belief = WorldEstimate(world.robot, world.goal, _HALL, cell=0.05)
+        belief = WorldEstimate(world.robot, world.goal, _HALL)
         lidar, detector = Lidar(range=10.0), Detector(range=10.0)
         took, sensors = [], []
         for k in range(options.updates):

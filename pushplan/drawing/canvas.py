@@ -14,7 +14,7 @@ SMOOTHING = 2
 """Everything is drawn this many times larger and then averaged."""
 THIN = 3
 """Edges up to this width [px, before smoothing] need no round joints."""
-_THINLY = 70  # of 255
+_UNSEEN_ALPHA = 70  # of 255, at which unseen places are shaded
 NOMINAL_PX = 600.0
 """Longer side of a picture to which widths of lines refer [px]."""
 
@@ -89,7 +89,7 @@ class Canvas:
         height, width = (
             round(count * unseen.resolution * self.scale) for count in unseen.cells.shape
         )
-        cells = np.where(unseen.cells[::-1], np.uint8(_THINLY), np.uint8(0))
+        cells = np.where(unseen.cells[::-1], np.uint8(_UNSEEN_ALPHA), np.uint8(0))
         mask = Image.fromarray(cells).resize(
             (max(width, 1), max(height, 1)), Image.Resampling.NEAREST
         )

@@ -232,6 +232,7 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
             told = self.task.told(world)
             sensing = need("pushplan.envs.sensing").SimulatedSensing
             self._sensing = sensing(self.task.variations, told, stream(layout, "sensing"))
+            self._sensing.look(told)
         info = _info(StepOutcome(0.0, False, "", False, False), 0.0, False)
         if world.goal_kind == "objects":
             info["completed"] = np.zeros(len(world.movables), dtype=bool)
@@ -314,6 +315,8 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
                 if len(gone):
                     simulator.remove(gone.tolist())
                     roster.drop(gone)
+            if self._sensing is not None:
+                self._sensing.look(self.task.told(simulator.world()), command)
         self._meanwhile = self._mode.afterwards(command)
         after = simulator.world()
         self._world = after
@@ -344,11 +347,15 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         return period * max(most, math.floor(clear / period + 1e-9))
 
     def _observe(self, world: World) -> NDArray[Any]:
-        if self._sensing is not None:
-            self._sensing.look(self.task.told(world), self._meanwhile)
         began = time.perf_counter()
-        scans = getattr(self._builder, "is_sensor", False)
-        observation = self._builder.observe(world if scans else self.world)
+        builder: Any = self._builder
+        observation: NDArray[Any]
+        if not getattr(builder, "is_sensor", False):
+            observation = builder.observe(self.world)
+        elif self._sensing is None:
+            observation = builder.observe(world)
+        else:
+            observation = builder.observe_scan(self._sensing.scan, self.world)
         self.observation_time_s = time.perf_counter() - began
         return observation
 

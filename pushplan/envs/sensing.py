@@ -9,9 +9,8 @@ import numpy as np
 
 from pushplan.envs.tasks.variations import TaskVariations
 from pushplan.perception import Detections, Detector, Lidar, LidarScan, WorldEstimate
+from pushplan.perception.lidar import DEFAULT_RANGE
 from pushplan.world import Twist, World
-
-_FAR = 30.0  # default range of the sensors [circumscribed radii]
 
 
 class SimulatedSensing:
@@ -27,10 +26,11 @@ class SimulatedSensing:
 
     Attributes:
         world: what the robot knows now.
+        scan: the last one that it got; None before the first.
     """
 
     def __init__(self, variations: TaskVariations, world: World, rng: np.random.Generator) -> None:
-        far = variations.view_range or _FAR * world.robot.circumscribed_radius
+        far = variations.view_range or DEFAULT_RANGE * world.robot.circumscribed_radius
         angle = variations.view_angle
         self._lidar = Lidar(
             field_of_view=angle,
@@ -43,7 +43,7 @@ class SimulatedSensing:
             range=far,
             position_noise=variations.object_noise,
             heading_noise=variations.turn_noise,
-            miss=variations.drop_out,
+            miss_rate=variations.drop_out,
         )
         self._interval = 1.0 / (variations.view_rate or math.inf)
         self._delay = variations.view_delay
@@ -57,11 +57,13 @@ class SimulatedSensing:
             world.static.bounds,
             known=known,
             unknown_price=variations.unknown_price,
+            position_noise=variations.object_noise,
             margin=world.margin or None,
         )
         self._inbox: deque[tuple[float, LidarScan, Detections]] = deque()
         self._seen_at = -math.inf
         self.world = world
+        self.scan: LidarScan | None = None
 
     def look(self, world: World, driven: Twist | None = None) -> None:
         """Look at the scene as it is now, and bring `world` up to date.
@@ -71,7 +73,7 @@ class SimulatedSensing:
             driven: what the robot was told to drive since the last look; nothing by default.
         """
         now = world.time
-        if now >= self._seen_at + self._interval - 1e-9:
+        if now >= self._seen_at + max(self._interval, 1e-6) - 1e-9:
             delay = self._delay
             if self._seen_at == -math.inf:  # an episode begins when the first reading is there
                 delay = 0.0
@@ -80,8 +82,8 @@ class SimulatedSensing:
             detections = self._detector.detect(world, self._rng)
             self._inbox.append((now + delay, scan, detections))
         while self._inbox and self._inbox[0][0] <= now + 1e-9:
-            _, scan, detections = self._inbox.popleft()
+            _, self.scan, detections = self._inbox.popleft()
             self._estimate.add_detections(detections)
-            self._estimate.add_scan(scan)
+            self._estimate.add_scan(self.scan)
         self._estimate.sent(driven or Twist(0.0, 0.0))
         self.world = self._estimate.world(world.robot_pose, world.robot_twist, now)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from pushplan.world import Movables, World
 from pushplan.world.checked_fields import (
     CheckedFields,
     Fraction,
-    Limits,
     NonNegativeFloat,
     PositiveFloat,
 )
@@ -24,13 +23,18 @@ _RAYS = 720  # in a full circle, by which the visible part of an outline is meas
 
 
 @dataclass(frozen=True, eq=False)
-class Detections:
+class Detections(CheckedFields):
     """Objects that were seen at one time.
 
     Args:
         time: when [s].
         objects: those that were seen, with their whole outlines.
+
+    Raises:
+        InvalidInputError: if a member has the wrong type.
     """
+
+    field_prefix: ClassVar[str] = "detections."
 
     time: float
     objects: Movables
@@ -49,9 +53,7 @@ class Detector(CheckedFields):
         least_visible: fraction of the visible angle of an object that has to be in view.
         position_noise: standard deviation of x and y [m].
         heading_noise: the same of the heading [rad].
-        miss: fraction of the objects in view that are not reported.
-        rate: detections a second at most [Hz].
-        delay: from the picture until it is there [s].
+        miss_rate: fraction of the objects in view that are not reported.
     """
 
     field_prefix: ClassVar[str] = "detector "
@@ -61,9 +63,7 @@ class Detector(CheckedFields):
     least_visible: Fraction = 0.3
     position_noise: NonNegativeFloat = 0.0
     heading_noise: NonNegativeFloat = 0.0
-    miss: Fraction = 0.0
-    rate: Annotated[float, Limits(0.0, open_low=True, finite=False)] = math.inf
-    delay: NonNegativeFloat = 0.0
+    miss_rate: Fraction = 0.0
 
     def detect(self, world: World, rng: np.random.Generator | None = None) -> Detections:
         """Look at a scene from the robot's pose.
@@ -79,7 +79,7 @@ class Detector(CheckedFields):
         if rng is not None:
             place = self.position_noise
             poses += np.array([place, place, self.heading_noise]) * rng.normal(size=poses.shape)
-            seen &= rng.random(len(poses)) >= self.miss
+            seen &= rng.random(len(poses)) >= self.miss_rate
         fixed = np.zeros(len(poses), dtype=np.bool_)
         return Detections(world.time, objects.moved_to(poses).holding_fixed(fixed).select(seen))
 

@@ -23,6 +23,8 @@ from pushplan.world.checked_fields import (
 )
 from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, IntArray, frozen
 
+DEFAULT_RANGE = 30.0
+"""How far the sensors of a robot see by default [circumscribed radii]."""
 Angle = Annotated[float, Limits(0.0, math.tau, open_low=True)]
 
 
@@ -34,9 +36,9 @@ class LidarScan(ArrayRecord, CheckedFields):
         time: when it was taken [s].
         pose: (3,) x, y [m], theta [rad] of the sensor then, world frame.
         bearings: (N,) directions of the beams from the sensor's heading [rad].
-        ranges: (N,) distances [m]; infinite where nothing is in range, NaN where a beam gave
-            nothing.
-        reach: greatest distance that is measured [m].
+        ranges: (N,) distances [m]. From ``range_max`` on nothing was met, and the distance is kept
+            as infinite; 0 and NaN are beams that gave nothing, and are kept as NaN (as REP 117).
+        range_max: greatest distance that is measured [m].
 
     Raises:
         InvalidInputError: if a member has the wrong type or shape.
@@ -48,16 +50,21 @@ class LidarScan(ArrayRecord, CheckedFields):
     pose: Annotated[FloatArray, Shape(3)]
     bearings: Annotated[FloatArray, Shape("N")]
     ranges: FloatArray
-    reach: PositiveFloat
+    range_max: PositiveFloat
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        ranges = np.array(self.ranges, dtype=np.float64)
+        try:
+            ranges = np.array(self.ranges, dtype=np.float64)
+        except (TypeError, ValueError):
+            ranges = np.full(1, -1.0)
         if ranges.shape != self.bearings.shape or (ranges < 0.0).any():
             raise InvalidInputError(
                 f"scan.ranges must be {len(self.bearings)} distances of 0 or more, got "
                 f"{short(self.ranges)}"
             )
+        ranges[ranges == 0.0] = np.nan
+        ranges[ranges >= self.range_max] = np.inf
         object.__setattr__(self, "ranges", frozen(ranges))
 
     @property
@@ -80,8 +87,6 @@ class Lidar(CheckedFields):
         range: greatest distance that is measured [m].
         noise: standard deviation of a distance [m].
         drop_out: fraction of the beams that give nothing.
-        rate: scans a second at most [Hz].
-        delay: from the scan until it is there [s].
     """
 
     field_prefix: ClassVar[str] = "lidar "
@@ -91,8 +96,6 @@ class Lidar(CheckedFields):
     range: PositiveFloat = 10.0
     noise: NonNegativeFloat = 0.0
     drop_out: Fraction = 0.0
-    rate: Annotated[float, Limits(0.0, open_low=True, finite=False)] = math.inf
-    delay: NonNegativeFloat = 0.0
 
     @functools.cached_property
     def _kept(self) -> BoolArray:

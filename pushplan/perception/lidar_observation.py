@@ -11,20 +11,19 @@ from numpy.typing import NDArray
 
 from pushplan.observation.builder import LimitedVector
 from pushplan.observation.state import goal_point
-from pushplan.perception.lidar import Lidar
+from pushplan.perception.lidar import DEFAULT_RANGE, Lidar, LidarScan
 from pushplan.world import RobotModel, World
 from pushplan.world.checked_fields import CheckedFields, Limits, PositiveFloat
-
-_FAR = 30.0  # default range [circumscribed radii]
 
 
 @dataclass(frozen=True)
 class LidarObservation(LimitedVector, CheckedFields):
-    """The scan of a lidar around the robot, without noise, as a vector.
+    """The scan of a lidar around the robot as a vector.
 
     First the distances that ``beams`` beams measure, beginning ahead and going left, in units of
     the range, 1 where they meet nothing; then x and y of the goal in the robot's frame in the same
     unit, and the robot's velocity ahead [m/s] and turn rate [rad/s]. Beams meet walls and objects.
+    In an environment with sensors it is their last scan, with their noise and field of view.
 
     Args:
         beams: in a full circle.
@@ -33,7 +32,7 @@ class LidarObservation(LimitedVector, CheckedFields):
     """
 
     is_sensor: ClassVar[bool] = True
-    """It is made of the scene as it is, and not of what is known of it."""
+    """It is made of the scene as it is, or of a scan, and not of what is known of the scene."""
 
     beams: Annotated[int, Limits(4, 4096)] = 180
     range: PositiveFloat = 10.0
@@ -45,19 +44,30 @@ class LidarObservation(LimitedVector, CheckedFields):
         return (self.beams + 4,)
 
     def observe(self, world: World) -> NDArray[np.float32]:
-        """The vector."""
-        scan = Lidar(beams=self.beams, range=self.range).scan(world)
+        """The vector, of a scan without noise of the scene."""
+        return self.observe_scan(Lidar(beams=self.beams, range=self.range).scan(world), world)
+
+    def observe_scan(self, scan: LidarScan, world: World) -> NDArray[np.float32]:
+        """The vector of a scan, of whatever bearings; the nearest distance of each direction.
+
+        Args:
+            scan: of the robot's lidar.
+            world: where the robot is and has to go.
+        """
+        nearest = np.ones(self.beams)
+        beam = np.rint(scan.bearings * (self.beams / math.tau)).astype(np.int64) % self.beams
+        np.fmin.at(nearest, beam, scan.ranges / self.range)
         x, y, theta = world.robot_pose.tolist()
         turn = complex(math.cos(theta), -math.sin(theta))
         goal = complex(*(goal_point(world) - (x, y)).tolist()) * turn / self.range
         assert world.robot_twist is not None
         speed = (complex(*world.robot_twist[:2].tolist()) * turn).real
         rest = [goal.real, goal.imag, speed, float(world.robot_twist[2])]
-        out = np.concatenate([np.minimum(scan.ranges / self.range, 1.0), rest])
+        out = np.concatenate([nearest, rest])
         clipped: NDArray[np.float32] = np.clip(out, -self.limit, self.limit).astype(np.float32)
         return clipped
 
 
 def builder_for(robot: RobotModel, far: float | None) -> LidarObservation:
     """The observation of a robot whose sensors see so far [m]; 30 of its radii if None."""
-    return LidarObservation(range=far or _FAR * robot.circumscribed_radius)
+    return LidarObservation(range=far or DEFAULT_RANGE * robot.circumscribed_radius)

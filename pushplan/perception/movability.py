@@ -13,6 +13,7 @@ from pushplan.world.checks import FloatArray, IntArray
 
 _TOUCH = 0.05  # gap at which the robot touches an object [circumscribed radii]
 _MOVED = 0.05  # motion that proves that an object can be moved [circumscribed radii]
+_SURE = 6.0  # standard deviations of a position by which one that was seen has to change
 _PATIENCE = 1.0  # time for which an object has to stop the robot [s]
 
 
@@ -25,9 +26,11 @@ class Movability:
 
     Args:
         robot: that pushes.
+        position_noise: standard deviation of the positions that are seen [m].
     """
 
-    def __init__(self, robot: RobotModel) -> None:
+    def __init__(self, robot: RobotModel, position_noise: float = 0.0) -> None:
+        self._motion = max(_MOVED * robot.circumscribed_radius, _SURE * position_noise)
         self._size = robot.circumscribed_radius
         self._first: dict[int, FloatArray] = {}
         self._stall = StallChecker(robot, _PATIENCE)
@@ -53,7 +56,7 @@ class Movability:
         objects = world.movables
         for number, pose in zip(objects.ids.tolist(), objects.poses, strict=True):
             first = self._first.setdefault(number, pose)
-            if math.dist(pose[:2], first[:2]) > _MOVED * self._size:
+            if math.dist(pose[:2], first[:2]) > self._motion:
                 self.seen_moving.add(number)
         if self._stall.update(world.robot_pose, world.time) and self._ahead:
             self.stopped_by |= self._touched(world) - self.seen_moving

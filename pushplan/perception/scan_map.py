@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from pushplan.world.occupancy_grid import rectangle_cover
 _EVIDENCE = frozen(
     np.array([1.5, -0.4, -2.0, 4.5])
 )  # log-odds of a hit and of a miss, and their limits
+_ROOM = 2.0  # cells around bodies that are free where nobody has seen
 _GONE = -1.0  # log-odds below which an occupied cell is free again
 _TILE = 16  # cells along the side of a part of the map whose rectangles are found anew together
 _MOST_CELLS = 25_000_000
@@ -48,12 +50,13 @@ class ScanMap:
         rim = number("rim", rim, low=0.0)
         self.origin = frozen(self._bounds[:2] - rim)
         extent = self._bounds[2:] - self._bounds[:2] + 2.0 * rim
-        columns, rows = (math.ceil(side / self.cell - 1e-9) for side in extent.tolist())
-        if rows * columns > _MOST_CELLS:
+        sides = [side / self.cell for side in extent.tolist()]
+        if sides[0] * sides[1] > _MOST_CELLS:
             raise InvalidInputError(
-                f"a map may have at most {_MOST_CELLS:,} cells, {rows:,} x {columns:,} are too "
-                "many: use larger cells"
+                f"a map may have at most {_MOST_CELLS:,} cells, {sides[1]:.3g} x {sides[0]:.3g} "
+                "are too many: use larger cells"
             )
+        columns, rows = (math.ceil(side - 1e-9) for side in sides)
         self.log_odds = np.zeros((rows, columns))
         self._occupied = self._solid = np.zeros((rows, columns), dtype=np.bool_)
         self._tiles: dict[tuple[int, int], list[FloatArray]] = {}
@@ -73,38 +76,64 @@ class ScanMap:
             ignored: (N,) beams that have hit something that belongs to no map.
         """
         hit = np.isfinite(scan.ranges)
-        passed = np.where(np.isnan(scan.ranges), 0.0, np.minimum(scan.ranges, scan.reach))
+        passed = np.where(np.isnan(scan.ranges), 0.0, np.minimum(scan.ranges, scan.range_max))
         ends = np.where(hit & ~ignored, scan.ranges + 0.5 * self.cell, np.inf)
         left, low = self.origin.tolist()
         x, y, heading = scan.pose.tolist()
         bearings = frozen(heading + scan.bearings)
         core.mark_scan(self.log_odds, left, low, self.cell, x, y, bearings, passed, ends, _EVIDENCE)
 
-    def clear(self, shapes: NDArray[Any]) -> None:
-        """Hold the cells in polygons of Shapely (K,) for free, where they are held for occupied."""
+    def clear(self, shapes: NDArray[Any], rim: float, inexact: float) -> None:
+        """Hold the cells in polygons of Shapely (K,) for free, where they are held for occupied.
+
+        Args:
+            shapes: the polygons.
+            rim: how far around them [m].
+            inexact: how far inside them those cells begin of which the map is sure [m].
+        """
+        inner = shapely.buffer(shapes, -inexact).tolist()
+        for k, part, x, y in self._windows(shapely.buffer(shapes, rim)):
+            cells = np.nonzero(part > 0.0)
+            if not len(cells[0]):
+                continue
+            places = x[cells[1]], y[cells[0]]
+            sure = part[cells] >= _EVIDENCE[3]
+            cleared = np.where(
+                sure,
+                shapely.contains_xy(inner[k], *places),
+                shapely.dwithin(shapes[k], shapely.points(*places), rim),
+            )
+            part[cells[0][cleared], cells[1][cleared]] = _EVIDENCE[2]
+
+    def _windows(
+        self, shapes: NDArray[Any]
+    ) -> Iterator[tuple[int, FloatArray, FloatArray, FloatArray]]:
+        """Of each polygon (K,) its number, the part of the map around it, and x and y of cells."""
         corners = (shapely.bounds(shapes).reshape(-1, 2, 2) - self.origin) / self.cell
         corners[:, 1] += 1.0
         boxes = np.clip(corners, 0.0, self.log_odds.shape[::-1]).astype(np.int64).reshape(-1, 4)
-        for shape, (c0, r0, c1, r1) in zip(shapes.tolist(), boxes.tolist(), strict=True):
-            part = self.log_odds[r0:r1, c0:c1]
-            if not (part > 0.0).any():
-                continue
-            rows, columns = np.nonzero(part > 0.0)
-            x, y = self.origin[:, None] + self.cell * (np.array([columns + c0, rows + r0]) + 0.5)
-            inside = shapely.contains_xy(shape, x, y)
-            part[rows[inside], columns[inside]] = _EVIDENCE[2]
+        for k, (c0, r0, c1, r1) in enumerate(boxes.tolist()):
+            x = self.origin[0] + self.cell * (np.arange(c0, c1) + 0.5)
+            y = self.origin[1] + self.cell * (np.arange(r0, r1) + 0.5)
+            yield k, self.log_odds[r0:r1, c0:c1], x, y
 
-    def static_map(self, *, unknown: str = "free") -> StaticMap:
+    def static_map(
+        self, *, unknown: str = "free", free: Sequence[shapely.Geometry] = ()
+    ) -> StaticMap:
         """The occupied cells as rectangles; the same map where nothing has changed.
 
         Args:
             unknown: ``"free"`` or ``"obstacle"``, what cells count as that nobody has seen.
+            free: polygons around which cells are free that nobody has seen, such as the robot.
         """
         stays = self._occupied & (self.log_odds > _GONE)
         self._occupied = (self.log_odds > 0.0) | stays
         solid = self._occupied
         if unknown == "obstacle":
-            solid = solid | self.unseen
+            hidden = self.unseen
+            for shape in free:
+                hidden &= ~self._around(shape)
+            solid = solid | hidden
         changed = np.flatnonzero(solid != self._solid)
         if not len(changed):
             return self._static
@@ -115,6 +144,20 @@ class ScanMap:
         polygons = [one for tile in sorted(self._tiles) for one in self._tiles[tile]]
         self._static = _plain_map(tuple(polygons), self._bounds)
         return self._static
+
+    def _around(self, shape: shapely.Geometry) -> BoolArray:
+        """(rows, columns) cells within two of a polygon."""
+        found: BoolArray = np.zeros(self.log_odds.shape, dtype=np.bool_)
+        wide = shapely.buffer(shape, _ROOM * self.cell)
+        sides: FloatArray = (shapely.bounds(wide) - np.tile(self.origin, 2)) / self.cell
+        c0, r0, c1, r1 = sides.tolist()
+        rows = slice(max(int(r0), 0), min(int(r1) + 1, found.shape[0]))
+        columns = slice(max(int(c0), 0), min(int(c1) + 1, found.shape[1]))
+        y, x = np.mgrid[rows, columns]
+        left, low = self.origin.tolist()
+        cells = left + self.cell * (x + 0.5), low + self.cell * (y + 0.5)
+        found[rows, columns] = shapely.contains_xy(wide, *cells)
+        return found
 
     def _rectangles(self, solid: BoolArray, row: int, column: int) -> list[FloatArray]:
         """Polygons (4, 2) [m] that cover the occupied cells of a tile."""

@@ -9,19 +9,22 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
+from pushplan.errors import InvalidInputError, short
 from pushplan.perception.detector import Detections
 from pushplan.perception.lidar import LidarScan, object_outlines
 from pushplan.perception.movability import Movability
 from pushplan.perception.scan_map import ScanMap
 from pushplan.world import Goal, Movables, PriceMap, RobotModel, StaticMap, Twist, World
-from pushplan.world.checks import FloatArray, choice, expect, number
+from pushplan.world.checks import FloatArray, checked_bounds, choice, expect, number
 from pushplan.world.occupancy_grid import UNKNOWN
+from pushplan.world.outline import transform
 from pushplan.world.unseen import Unseen
 
 _CELLS = 8.0  # to the inscribed radius of the robot
 _RIM = 1.5  # cells around an object in which a beam is taken to have hit the object
 _INEXACT = 0.75  # cells by which a wall may stand nearer than the map has it
-_BEHIND = 2.0  # cells behind a place in an object that a beam has to reach: then it is gone
+_BEHIND = 2.0  # cells behind an object that most beams which would hit it have to reach: it is gone
+_MOST_CELLS = 4e6  # of a map whose cells nobody has chosen
 
 
 class WorldEstimate:
@@ -36,7 +39,9 @@ class WorldEstimate:
         goal: where the robot, or the objects, have to go.
         bounds: (4,) x_min, y_min, x_max, y_max of the scene [m].
         known: what is known to be static; then scans say nothing new of what is static.
-        cell: side of the cells of the map [m]; an eighth of the robot's inscribed radius if None.
+        cell: side of the cells of the map [m]; if None an eighth of the robot's inscribed radius,
+            and more where that were more than 4 million cells.
+        position_noise: standard deviation of the positions of detected objects [m].
         unknown: ``"free"`` or ``"obstacle"``, what counts where nobody has looked.
         unknown_price: price of a metre where nobody has looked, see `pushplan.world.PriceMap`.
         drift: by how much the place of an object becomes uncertain that is not seen [m/√s].
@@ -65,25 +70,33 @@ class WorldEstimate:
         *,
         known: StaticMap | None = None,
         cell: float | None = None,
+        position_noise: float = 0.0,
         unknown: str = "free",
         unknown_price: float = 0.0,
         drift: float = 0.02,
         margin: float | None = None,
     ) -> None:
         self._robot = expect("robot", robot, RobotModel)
+        if not isinstance(goal, Goal):
+            raise InvalidInputError(f"goal must be the goal of a World, got {short(goal)}")
         self._goal = goal
         self._known = known
+        if known is not None:
+            expect("known", known, StaticMap)
         self._unknown = choice("treatment of unknown cells", unknown, UNKNOWN)
         self._unknown_price = number("unknown_price", unknown_price, low=0.0)
         self._drift = number("drift", drift, low=0.0)
+        self._near = 2.0 * number("position_noise", position_noise, low=0.0)
         if cell is None:
+            x0, y0, x1, y1 = checked_bounds("bounds", bounds).tolist()
             cell = robot.inscribed_radius / _CELLS
+            cell = max(cell, math.sqrt((x1 - x0) * (y1 - y0) / _MOST_CELLS))
         self.map = ScanMap(bounds, cell, robot.circumscribed_radius)
         if margin is None:
             margin = _INEXACT * self.map.cell * (known is None)
         self._margin = number("margin", margin, low=0.0)
         self.objects = Movables.empty()
-        self.movability = Movability(robot)
+        self.movability = Movability(robot, position_noise)
         self._seen_at: dict[int, float] = {}
         self._time = -math.inf
 
@@ -109,7 +122,7 @@ class WorldEstimate:
         self._time = max(self._time, time)
         self.objects = self.objects.updated(seen)
         if self._known is None:
-            self.map.clear(shapely.buffer(_polygons(seen), 0.5 * self.map.cell))
+            self.map.clear(_polygons(seen), 0.5 * self.map.cell, self._near)
 
     def add_scan(self, scan: LidarScan) -> None:
         """Take a laser scan."""
@@ -120,7 +133,7 @@ class WorldEstimate:
         if hit.any() and len(self.objects):
             tree = shapely.STRtree(_polygons(self.objects))
             points = shapely.points(scan.points)
-            beams, _ = tree.query(points, "dwithin", _RIM * self.map.cell)
+            beams, _ = tree.query(points, "dwithin", _RIM * self.map.cell + self._near)
             of_object[np.flatnonzero(hit)[beams]] = True
         self.map.add(scan, of_object)
 
@@ -130,14 +143,15 @@ class WorldEstimate:
         old = np.array([self._seen_at[label] < scan.time for label in ids.tolist()], dtype=np.bool_)
         if not len(scan.bearings) or not old.any():
             return
-        places = _inner_places(self.objects.select(old)) - scan.pose[:2]
-        away = np.hypot(*places.T)
-        turn = np.arctan2(places[:, 1], places[:, 0]) - scan.pose[2]
-        off = np.abs(np.remainder(turn[:, None] - scan.bearings + np.pi, 2.0 * np.pi) - np.pi)
-        beam = off.argmin(axis=1)
-        met = off.min(axis=1) < 4.0 * np.pi / max(len(scan.bearings), 2)
-        ranges = np.nan_to_num(scan.ranges[beam], nan=0.0, posinf=scan.reach)
-        gone = ids[old][met & (ranges > away + _BEHIND * self.map.cell)]
+        seen = np.nan_to_num(scan.ranges, nan=0.0, posinf=scan.range_max)
+        missed = []
+        for k in np.flatnonzero(old).tolist():
+            ends = _far_sides(self.objects.select([k]), scan)
+            met = np.isfinite(ends) & (seen > 0.0)
+            beyond = met & (seen > ends + _BEHIND * self.map.cell + self._near)
+            if met.any() and 2 * beyond.sum() > met.sum():
+                missed.append(k)
+        gone = ids[missed]
         if len(gone):
             self.objects = self.objects.updated(Movables.empty(), gone)
 
@@ -158,7 +172,11 @@ class WorldEstimate:
         """
         static = self._known
         if static is None:
-            static = self.map.static_map(unknown=self._unknown)
+            free = []
+            if self._unknown == "obstacle":
+                parts = [transform(np.asarray(pose), one) for one in self._robot.contact_parts]
+                free = [*_polygons(self.objects), *map(shapely.Polygon, parts)]
+            static = self.map.static_map(unknown=self._unknown, free=free)
         cells = self.map.unseen
         origin = self.map.origin
         price = None
@@ -181,13 +199,22 @@ class WorldEstimate:
         return self.movability.update(world)
 
 
-def _inner_places(objects: Movables) -> FloatArray:
-    """(K, 2) places [m] that are inside the objects: in the middle of their first parts."""
-    firsts = np.searchsorted(objects.part_owners, np.arange(len(objects)))
-    corners, starts = object_outlines(objects)
-    sums = np.add.reduceat(corners, starts[:-1], axis=0)
-    middles: FloatArray = (sums / np.diff(starts)[:, None])[firsts]
-    return middles
+def _far_sides(one: Movables, scan: LidarScan) -> FloatArray:
+    """(N,) where the beams of a scan would leave an object [m]; infinite where they miss it."""
+    corners, starts = object_outlines(one)
+    following = np.arange(1, len(corners) + 1)
+    following[starts[1:] - 1] = starts[:-1]
+    a = corners - scan.pose[:2]
+    edge = a[following] - a
+    angles = scan.pose[2] + scan.bearings
+    along = np.column_stack([np.cos(angles), np.sin(angles)])[:, None]
+    across = along[..., 0] * edge[:, 1] - along[..., 1] * edge[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        away = (a[:, 0] * edge[:, 1] - a[:, 1] * edge[:, 0]) / across
+        part = (a[:, 0] * along[..., 1] - a[:, 1] * along[..., 0]) / across
+    crossed = (away > 0.0) & (part >= 0.0) & (part <= 1.0)
+    ends = np.where(crossed, away, -np.inf).max(axis=1, initial=-np.inf)
+    return np.where(np.isfinite(ends), ends, np.inf)
 
 
 def _polygons(objects: Movables) -> NDArray[Any]:

@@ -190,7 +190,10 @@ class World(ArrayRecord, CheckedFields):
 
     @property
     def goal_reached(self) -> bool:
-        """True if the robot, or every object, is where the goal wants it."""
+        """True if the robot, or every object, is where the goal wants it.
+
+        While there are places that nobody has seen, nobody knows that of an area.
+        """
         if isinstance(self.goal, NavigationGoal):
             return self.goal.reached_by(self.robot_pose)
         if isinstance(self.goal, ObjectGoals):
@@ -198,6 +201,8 @@ class World(ArrayRecord, CheckedFields):
             here = robot is None or robot.reached_by(self.robot_pose)
             if not here or not np.isin(self.goal.ids, self.movables.ids).all():
                 return False
+        elif self.unseen is not None:
+            return False
         return bool(self.completed.all())
 
     def robot_outline_world(self) -> tuple[FloatArray, ...]:

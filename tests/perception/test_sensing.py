@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
 from conftest import make_robot
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -78,6 +79,11 @@ class TestLidar:
         scan = Lidar(beams=360, field_of_view=math.pi).scan(hall())
         assert len(scan.bearings) == 181 and np.abs(scan.bearings).max() <= math.pi / 2 + 1e-9
 
+    def test_what_drivers_write_where_nothing_is_met_is_no_hit(self):
+        scan = LidarScan(0.0, np.zeros(3), np.zeros(4), np.array([0.0, 2.0, 1e300, 1.0]), 2.0)
+        np.testing.assert_array_equal(scan.ranges, [np.nan, np.inf, np.inf, 1.0])
+        assert len(scan.points) == 1
+
     def test_noise_and_drop_outs_are_as_large_as_asked_for(self):
         lidar = Lidar(beams=20_000, range=20.0, noise=0.03, drop_out=0.2)
         exact = Lidar(beams=20_000, range=20.0).scan(hall())
@@ -102,8 +108,9 @@ class TestLidar:
             Lidar(**options)
 
     def test_a_scan_with_too_few_ranges_is_refused(self):
-        with pytest.raises(InvalidInputError, match="ranges must be 2 distances"):
-            LidarScan(0.0, np.zeros(3), np.zeros(2), np.ones(3), 5.0)
+        for ranges in (np.ones(3), "ab", [1.0, -1.0], None):
+            with pytest.raises(InvalidInputError, match="ranges must be 2 distances"):
+                LidarScan(0.0, np.zeros(3), np.zeros(2), ranges, 5.0)
 
 
 class TestDetector:
@@ -159,8 +166,9 @@ class TestScanMap:
         )
 
     def test_too_many_cells_are_refused(self):
-        with pytest.raises(InvalidInputError, match="use larger cells"):
-            ScanMap(HALL, 1e-4)
+        for cell in (1e-4, 1e-320):
+            with pytest.raises(InvalidInputError, match="use larger cells"):
+                ScanMap(HALL, cell)
 
 
 class TestWorldEstimate:
@@ -177,6 +185,61 @@ class TestWorldEstimate:
         belief = estimate()
         assert len(look(belief, hall([(1.0, 1.5, 0.3)])).movables) == 1
         assert len(look(belief, hall(time=1.0)).movables) == 0
+
+    @pytest.mark.parametrize(
+        "lidar",
+        [
+            Lidar(beams=36),
+            Lidar(beams=72),
+            Lidar(field_of_view=math.radians(20.0)),
+            Lidar(field_of_view=math.radians(60.0)),
+        ],
+    )
+    def test_an_object_that_no_beam_could_hit_is_not_forgotten(self, lidar):
+        """It stands between two beams, or beside the field of view, and was not detected."""
+        belief = estimate()
+        edge = 0.5 * lidar.field_of_view + 0.15
+        bearing = math.pi / 36 if lidar.beams < 100 else edge
+        small = Movables.from_outlines(
+            [0.2 * BOX], [[2.5 * math.cos(bearing), 2.5 * math.sin(bearing), 0.0]]
+        )
+        belief.add_detections(Detections(0.0, small))
+        belief.add_scan(lidar.scan(replace(hall(time=1.0), movables=small)))
+        assert len(belief.objects) == 1
+
+    def test_unknown_space_may_be_closed(self):
+        """Neither the robot nor an object is in what nobody has seen."""
+        belief = estimate(unknown="obstacle")
+        there = hall([(1.5, 0.4, 0.4)], at=(-2.0, 0.0, 0.0))
+        world = look(belief, there, Lidar(field_of_view=4.7))
+        solid = shapely.union_all([shapely.Polygon(part) for part in world.static.convex_parts])
+        bodies = [*world.robot_outline_world(), *world.movables.every_part_world]
+        assert solid.area > 5.0
+        assert not any(solid.intersects(shapely.Polygon(part)) for part in bodies)
+
+    def test_a_wall_behind_an_object_with_noise_stays(self):
+        belief = estimate(position_noise=0.03)
+        wall_of = [wall(1.5, -1.0, 1.7, 1.0)]
+        for time in range(6):
+            look(belief, hall(walls=wall_of, time=time))
+        rng = np.random.default_rng(3)
+        noisy = Detector(position_noise=0.03)
+        for time in range(10, 30):
+            there = hall([(1.28, 0.0, 0.0)], wall_of, time=time)
+            belief.add_detections(noisy.detect(there, rng))
+            belief.add_scan(Lidar().scan(there))
+        solid = belief.world((0.0, 0.0, 0.0), None, 30.0).static
+        walls = shapely.union_all([shapely.Polygon(part) for part in solid.convex_parts])
+        assert walls.intersection(shapely.box(1.4, -0.15, 1.65, 0.15)).area > 0.01
+
+    def test_noise_is_no_motion(self):
+        belief = estimate(position_noise=0.02)
+        rng = np.random.default_rng(0)
+        for time in range(200):
+            noisy = Detector(position_noise=0.02).detect(hall([(1.5, 0.0, 0.0)], time=time), rng)
+            belief.add_detections(noisy)
+            world = belief.world((0.0, 0.0, 0.0), None, time)
+        assert belief.movability.known(world.movables.ids) == ["unknown"]
 
     def test_objects_are_no_walls(self):
         world = look(estimate(), hall([(1.5, 0.4, 0.4), (-2.0, 0.0, 0.0)]))
@@ -227,7 +290,7 @@ class TestWorldEstimate:
         rng = np.random.default_rng(1)
         for time in range(20):
             there = hall([(1.5, 0.0, 0.0)], at=(-2.0 + 0.1 * time, 0.5, 0.1 * time), time=time)
-            detector = Detector(position_noise=0.01, heading_noise=0.02, miss=0.2)
+            detector = Detector(position_noise=0.01, heading_noise=0.02, miss_rate=0.2)
             belief.add_detections(detector.detect(there, rng))
             belief.add_scan(Lidar(noise=0.02, drop_out=0.2).scan(there, rng))
         world = belief.world(there.robot_pose, None, there.time)
@@ -253,6 +316,14 @@ class TestWorldEstimate:
             estimate().add_scan(5)
         with pytest.raises(InvalidInputError, match="detections must be a Detections"):
             estimate().add_detections(Movables.empty())
+        with pytest.raises(InvalidInputError, match="time must be a number"):
+            Detections("nan", Movables.empty())
+        with pytest.raises(InvalidInputError, match="objects must be a Movables"):
+            Detections(0.0, 5)
+        with pytest.raises(InvalidInputError, match="known must be a StaticMap"):
+            WorldEstimate(ROBOT, GOAL, HALL, known="x")
+        with pytest.raises(InvalidInputError, match="goal must be"):
+            WorldEstimate(ROBOT, None, HALL)
         with pytest.raises(InvalidInputError, match="robot must be a RobotModel"):
             WorldEstimate("jackal", GOAL, HALL)
         with pytest.raises(InvalidInputError, match="bounds"):

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from pushplan.control import ImmediateExecutor
 from pushplan.envs import PushEnv
 from pushplan.evaluation import run_episode
 from pushplan.perception import Detector, Lidar, WorldEstimate
 from pushplan.planners import make_policy
+from pushplan.planners.rearrangement.look_around import LookAround
 from pushplan.runtime import CommandStatus, Runner
 from pushplan.scenarios import Scenario
 from pushplan.world import (
@@ -16,6 +20,7 @@ from pushplan.world import (
     GoalDisc,
     Movables,
     StaticMap,
+    Unseen,
     World,
     save_world,
     turtlebot3_burger,
@@ -124,3 +129,41 @@ def test_an_object_that_nobody_has_seen_is_looked_for(tmp_path):
         if len(env.world.movables):
             break
     assert len(env.world.movables) == 1
+
+
+@pytest.mark.parametrize("policy", ["greedy", "gtsp-mpc"])
+def test_an_area_that_is_not_seen_is_not_done(policy):
+    """A runner goes on while there may be objects that nobody has seen."""
+    area = ClearanceArea(
+        np.array([(0.4, 0.4), (1.6, 0.4), (1.6, 1.6), (0.4, 1.6)]), np.ones(4, dtype=bool)
+    )
+    robot = turtlebot3_burger("pusher")
+    world = World(
+        robot,
+        np.array([1.0, 0.4, np.pi / 2]),
+        StaticMap.build(bounds=(0, 0, 2, 2)),
+        Movables.empty(),
+        area,
+        unseen=Unseen(np.ones((20, 20), dtype=bool), 0.1, np.zeros(2)),
+    )
+    assert not world.goal_reached and replace(world, unseen=None).goal_reached
+    with Runner(policy, period=0.1) as runner:
+        command = runner.start(world)
+        for step in range(1, 8):
+            runner.update(world.moved(time=0.1 * step))
+            command = runner.command(0.1 * step)
+        assert command.status is not CommandStatus.DONE
+
+
+def test_what_is_known_to_be_solid_hides_nothing():
+    column = np.array([(0.8, 0.8), (1.2, 0.8), (1.2, 1.2), (0.8, 1.2)])
+    cells = np.zeros((40, 40), dtype=bool)
+    cells[16:24, 16:24] = True
+    world = replace(
+        two_doors(),
+        static=StaticMap.build(polygons=[column], bounds=(0, 0, 2, 2)),
+        unseen=Unseen(cells, 0.05, np.zeros(2)),
+    )
+    look = LookAround(ImmediateExecutor(), np.random.default_rng(0))
+    assert look.command(world) is None
+    assert look.command(replace(world, static=StaticMap.build(bounds=(0, 0, 2, 2)), time=9.0))

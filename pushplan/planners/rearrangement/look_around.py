@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -10,10 +11,11 @@ from scipy import ndimage
 
 from pushplan.planners.following.plan_follower import PlanFollower
 from pushplan.planners.registry import make_planner
-from pushplan.world import ClearanceArea, GoalDisc, Twist, World
+from pushplan.world import ClearanceArea, GoalDisc, PlanningExecutor, Twist, World
 from pushplan.world.checks import BoolArray, FloatArray
 
 _HIDES = 0.25  # radius of what may hide where nobody has looked [inscribed radii of the robot]
+_LOOKED_UP = 0.5  # time after which it is looked up again what nobody has seen [s]
 _NEAR = 2.0  # distance to a place from which it is taken to be seen [circumscribed radii]
 
 
@@ -23,9 +25,16 @@ class LookAround:
     With a `ClearanceArea` only places in the area count. A place that cannot be seen from near it,
     or to which no way leads, is not visited again. When all has been seen, each object is visited
     once more: one that is out of sight may have been pushed by another.
+
+    Args:
+        executor: runs planning calls.
+        rng: of the planner.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, executor: PlanningExecutor, rng: np.random.Generator) -> None:
+        self._executor = executor
+        self._rng = rng
+        self._hidden: tuple[float, FloatArray] = (-math.inf, np.zeros((0, 2)))
         self._follower = PlanFollower(make_planner("kinodynamic-rrt"))
         self._target: GoalDisc | None = None
         self._hopeless: list[FloatArray] = []
@@ -33,7 +42,9 @@ class LookAround:
 
     def command(self, world: World) -> Twist | None:
         """The next velocity; None where nothing is left to look at."""
-        hidden = _hiding_places(world)
+        if not 0.0 <= world.time - self._hidden[0] < _LOOKED_UP:
+            self._hidden = world.time, _hiding_places(world)
+        hidden = self._hidden[1]
         target = self._target
         if target is not None:
             seen = not (np.hypot(*(hidden - target.center).T) <= target.radius).any()
@@ -46,7 +57,8 @@ class LookAround:
         if target is None:
             target = self._place(world, hidden) or self._object(world)
             if target is not None:
-                self._follower.reset(_at_rest(world, target), np.random.default_rng(0))
+                self._follower.reset(_at_rest(world, target), self._rng)
+                self._follower.plan_with(self._executor)
         self._target = target
         if target is None:
             return None
@@ -90,10 +102,12 @@ def _hiding_places(world: World) -> FloatArray:
     assert unseen is not None
     cells: BoolArray = unseen.cells
     points = unseen.centres(cells)
-    bodies = [shapely.Polygon(part) for part in world.movables.every_part_world]
-    if bodies:
-        solid = shapely.buffer(shapely.union_all(bodies), unseen.resolution)
-        covered = shapely.contains_xy(solid, points)
+    parts = (*world.movables.every_part_world, *world.static.convex_parts)
+    if parts:
+        tree = shapely.STRtree([shapely.Polygon(part) for part in parts])
+        near, _ = tree.query(shapely.points(points), "dwithin", unseen.resolution)
+        covered = np.zeros(len(points), dtype=np.bool_)
+        covered[near] = True
         cells = cells.copy()
         cells[cells] = ~covered
     room = ndimage.distance_transform_edt(np.pad(cells, 1))[1:-1, 1:-1]

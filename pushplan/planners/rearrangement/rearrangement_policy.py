@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.control import EpisodeClock
+from pushplan.control import EpisodeClock, ImmediateExecutor
 from pushplan.imports.on_demand import need
 from pushplan.planners.arguments import check_pusher
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
-from pushplan.world import Twist, World
+from pushplan.world import PlanningExecutor, Twist, World
 from pushplan.world.checks import expect
 
 
@@ -27,6 +27,8 @@ class RearrangementPolicy(ABC):
     goal_kind = "objects"
     _look_around: Any = None
     """A `LookAround`, once one is needed."""
+    _executor: PlanningExecutor = ImmediateExecutor()
+    _rng: np.random.Generator = np.random.default_rng(0)
 
     def __init__(self, config: RearrangementConfig | None = None) -> None:
         self.config = expect("config", config or RearrangementConfig(), RearrangementConfig)
@@ -35,6 +37,7 @@ class RearrangementPolicy(ABC):
     def reset(self, world: World, rng: np.random.Generator) -> None:
         """Forget the last episode."""
         self._forget()
+        self._rng = rng
 
     def act(self, world: World, observation: Any = None) -> Twist:
         """The velocity for this step; stops when nothing is left to be done.
@@ -47,10 +50,11 @@ class RearrangementPolicy(ABC):
 
     def _act_or_look(self, world: World) -> Twist:
         """The velocity for an instant; looks around where no object is known that is left."""
-        if world.unseen is not None and self._recovery is None and world.completed.all():
+        idle = self._recovery is None and world.completed.all() and not world.goal_reached
+        if world.unseen is not None and idle:
             if self._look_around is None:  # it imports what nothing else here needs
                 module = need("pushplan.planners.rearrangement.look_around")
-                self._look_around = module.LookAround()
+                self._look_around = module.LookAround(self._executor, self._rng)
             twist: Twist | None = self._look_around.command(world)
             if twist is not None:
                 return twist
