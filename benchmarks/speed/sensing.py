@@ -102,7 +102,8 @@ def main() -> None:
     write("")
     head("commands", "CPU p50 [ms]", "p99.9", "worst")
     took = [t for k in range(options.episodes) for t in command_times(options.seed + k)]
-    row(len(took), *percentiles(took, (50, 99.9, 100), 2))
+    if took:
+        row(len(took), *percentiles(took, (50, 99.9, 100), 2))
 
 
 if __name__ == "__main__":

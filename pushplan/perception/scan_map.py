@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -91,31 +91,21 @@ class ScanMap:
             rim: how far around them [m].
             inexact: how far inside them those cells begin of which the map is sure [m].
         """
-        inner = shapely.buffer(shapes, -inexact).tolist()
-        for k, part, x, y in self._windows(shapely.buffer(shapes, rim)):
-            cells = np.nonzero(part > 0.0)
-            if not len(cells[0]):
-                continue
-            places = x[cells[1]], y[cells[0]]
-            sure = part[cells] >= _EVIDENCE[3]
-            cleared = np.where(
-                sure,
-                shapely.contains_xy(inner[k], *places),
-                shapely.dwithin(shapes[k], shapely.points(*places), rim),
-            )
-            part[cells[0][cleared], cells[1][cleared]] = _EVIDENCE[2]
-
-    def _windows(
-        self, shapes: NDArray[Any]
-    ) -> Iterator[tuple[int, FloatArray, FloatArray, FloatArray]]:
-        """Of each polygon (K,) its number, the part of the map around it, and x and y of cells."""
         corners = (shapely.bounds(shapes).reshape(-1, 2, 2) - self.origin) / self.cell
-        corners[:, 1] += 1.0
+        corners += [[-rim / self.cell], [rim / self.cell + 1.0]]
         boxes = np.clip(corners, 0.0, self.log_odds.shape[::-1]).astype(np.int64).reshape(-1, 4)
-        for k, (c0, r0, c1, r1) in enumerate(boxes.tolist()):
-            x = self.origin[0] + self.cell * (np.arange(c0, c1) + 0.5)
-            y = self.origin[1] + self.cell * (np.arange(r0, r1) + 0.5)
-            yield k, self.log_odds[r0:r1, c0:c1], x, y
+        for shape, (c0, r0, c1, r1) in zip(shapes.tolist(), boxes.tolist(), strict=True):
+            part = self.log_odds[r0:r1, c0:c1]
+            if not (part > 0.0).any():
+                continue
+            rows, columns = np.nonzero(part > 0.0)
+            x, y = self.origin[:, None] + self.cell * (np.array([columns + c0, rows + r0]) + 0.5)
+            cleared = np.where(
+                part[rows, columns] >= _EVIDENCE[3],
+                shapely.contains_xy(shapely.buffer(shape, -inexact), x, y),
+                shapely.dwithin(shape, shapely.points(x, y), rim),
+            )
+            part[rows[cleared], columns[cleared]] = _EVIDENCE[2]
 
     def static_map(
         self, *, unknown: str = "free", free: Sequence[shapely.Geometry] = ()

@@ -144,8 +144,14 @@ class WorldEstimate:
         if not len(scan.bearings) or not old.any():
             return
         seen = np.nan_to_num(scan.ranges, nan=0.0, posinf=scan.range_max)
+        offset = self.objects.poses[:, :2] - scan.pose[:2]
+        away = np.hypot(*offset.T)
+        turn = np.arctan2(offset[:, 1], offset[:, 0]) - scan.pose[2]
+        off = np.abs(np.remainder(turn[:, None] - scan.bearings + np.pi, 2.0 * np.pi) - np.pi)
+        width = np.arcsin(np.minimum(self.objects.radii / np.maximum(away, 1e-9), 1.0))
+        maybe = ((off <= width[:, None]) & (seen > away[:, None])).any(axis=1)
         missed = []
-        for k in np.flatnonzero(old).tolist():
+        for k in np.flatnonzero(old & maybe).tolist():
             ends = _far_sides(self.objects.select([k]), scan)
             met = np.isfinite(ends) & (seen > 0.0)
             beyond = met & (seen > ends + _BEHIND * self.map.cell + self._near)
