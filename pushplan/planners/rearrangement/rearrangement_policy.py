@@ -28,7 +28,6 @@ class RearrangementPolicy(ABC):
     _look_around: Any = None
     """A `LookAround`, once one is needed."""
     _executor: PlanningExecutor = ImmediateExecutor()
-    _rng: np.random.Generator = np.random.default_rng(0)
 
     def __init__(self, config: RearrangementConfig | None = None) -> None:
         self.config = expect("config", config or RearrangementConfig(), RearrangementConfig)
@@ -68,6 +67,7 @@ class RearrangementPolicy(ABC):
         """Begin an episode."""
         self._clock = EpisodeClock(self.config.response)
         self._look_around = None
+        self._rng = np.random.default_rng(0)
         self._recovery: Callable[[World, float], Twist | None] | None = None
 
     def _recover(self, world: World) -> Twist | None:
