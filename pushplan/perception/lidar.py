@@ -24,7 +24,7 @@ from pushplan.world.checked_fields import (
 from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, IntArray, frozen
 
 DEFAULT_RANGE = 30.0
-"""How far the sensors of a robot see by default [circumscribed radii]."""
+"""Range of the sensors of a robot by default [circumscribed radii]."""
 Angle = Annotated[float, Limits(0.0, math.tau, open_low=True)]
 
 
