@@ -102,7 +102,7 @@ def _beside(*pictures: np.ndarray) -> np.ndarray:
 
 
 def sensing() -> None:
-    """What a robot with a lidar knows of a maze at four times, with its plan."""
+    """The knowledge of a robot with a lidar about a maze at four times, with its plan."""
     scenario = suite("maze-2d-10-lidar", episodes=1, first_seed=1).scenarios[0]
     pictures = []
 

@@ -122,7 +122,7 @@ class ScanMap:
         if unknown == "obstacle":
             hidden = self.unseen
             for shape in free:
-                hidden &= ~self._around(shape)
+                self._clear_around(hidden, shape)
             solid = solid | hidden
         changed = np.flatnonzero(solid != self._solid)
         if not len(changed):
@@ -135,19 +135,17 @@ class ScanMap:
         self._static = _plain_map(tuple(polygons), self._bounds)
         return self._static
 
-    def _around(self, shape: shapely.Geometry) -> BoolArray:
-        """(rows, columns) cells within two of a polygon."""
-        found: BoolArray = np.zeros(self.log_odds.shape, dtype=np.bool_)
+    def _clear_around(self, flags: BoolArray, shape: shapely.Geometry) -> None:
+        """Set flags (rows, columns) of the cells within two of a polygon to False."""
         wide = shapely.buffer(shape, _ROOM * self.cell)
         sides: FloatArray = (shapely.bounds(wide) - np.tile(self.origin, 2)) / self.cell
         c0, r0, c1, r1 = sides.tolist()
-        rows = slice(max(int(r0), 0), min(int(r1) + 1, found.shape[0]))
-        columns = slice(max(int(c0), 0), min(int(c1) + 1, found.shape[1]))
+        rows = slice(max(int(r0), 0), min(int(r1) + 1, flags.shape[0]))
+        columns = slice(max(int(c0), 0), min(int(c1) + 1, flags.shape[1]))
         y, x = np.mgrid[rows, columns]
         left, low = self.origin.tolist()
         cells = left + self.cell * (x + 0.5), low + self.cell * (y + 0.5)
-        found[rows, columns] = shapely.contains_xy(wide, *cells)
-        return found
+        flags[rows, columns] &= ~shapely.contains_xy(wide, *cells)
 
     def _rectangles(self, solid: BoolArray, row: int, column: int) -> list[FloatArray]:
         """Polygons (4, 2) [m] that cover the occupied cells of a tile."""

@@ -114,10 +114,9 @@ class WorldEstimate:
     def add_detections(self, detections: Detections) -> None:
         """Take the objects that were seen at one time; older ones than before change nothing."""
         seen = expect("detections", detections, Detections).objects
-        new = [detections.time > self._seen_at.get(k, -math.inf) for k in seen.ids.tolist()]
-        self._put(seen.select(np.array(new, dtype=np.bool_)), detections.time)
-
-    def _put(self, seen: Movables, time: float) -> None:
+        time = detections.time
+        new = [time > self._seen_at.get(label, -math.inf) for label in seen.ids.tolist()]
+        seen = seen.select(np.array(new, dtype=np.bool_))
         self._seen_at |= dict.fromkeys(seen.ids.tolist(), time)
         self._time = max(self._time, time)
         self.objects = self.objects.updated(seen)
@@ -139,27 +138,27 @@ class WorldEstimate:
 
     def _forget(self, scan: LidarScan) -> None:
         """Drop the objects through whose place the scan sees."""
-        ids = self.objects.ids
-        old = np.array([self._seen_at[label] < scan.time for label in ids.tolist()], dtype=np.bool_)
-        if not len(scan.bearings) or not old.any():
+        ids = self.objects.ids.tolist()
+        old = [self._seen_at[label] < scan.time for label in ids]
+        if not len(scan.bearings) or not any(old):
             return
+        objects = self.objects.select(np.array(old, dtype=np.bool_))
         seen = np.nan_to_num(scan.ranges, nan=0.0, posinf=scan.range_max)
-        offset = self.objects.poses[:, :2] - scan.pose[:2]
+        offset = objects.poses[:, :2] - scan.pose[:2]
         away = np.hypot(*offset.T)
         turn = np.arctan2(offset[:, 1], offset[:, 0]) - scan.pose[2]
         off = np.abs(np.remainder(turn[:, None] - scan.bearings + np.pi, 2.0 * np.pi) - np.pi)
-        width = np.arcsin(np.minimum(self.objects.radii / np.maximum(away, 1e-9), 1.0))
+        width = np.arcsin(np.minimum(objects.radii / np.maximum(away, 1e-9), 1.0))
         maybe = ((off <= width[:, None]) & (seen > away[:, None])).any(axis=1)
         missed = []
-        for k in np.flatnonzero(old & maybe).tolist():
-            ends = _far_sides(self.objects.select([k]), scan)
+        for k in np.flatnonzero(maybe).tolist():
+            ends = _far_sides(objects.select([k]), scan)
             met = np.isfinite(ends) & (seen > 0.0)
             beyond = met & (seen > ends + _BEHIND * self.map.cell + self._near)
             if met.any() and 2 * beyond.sum() > met.sum():
                 missed.append(k)
-        gone = ids[missed]
-        if len(gone):
-            self.objects = self.objects.updated(Movables.empty(), gone)
+        if missed:
+            self.objects = self.objects.updated(Movables.empty(), objects.ids[missed])
 
     def sent(self, twist: Twist) -> None:
         """Take the command that the robot drives from now on.

@@ -16,7 +16,7 @@ NOISE = {"range_noise": 0.02, "object_noise": 0.02, "turn_noise": 0.05, "drop_ou
 
 
 def episode(task: str, simulator: str, variations: dict, steps: int = 6) -> list[bytes]:
-    """What is known in an episode of straight driving, as bytes."""
+    """Bytes of all that is known in an episode of straight driving."""
     env = PushEnv(task=task, simulator=simulator, variations=variations, observation="state")
     env.reset(seed=5)
     known = []
