@@ -58,6 +58,7 @@ class SimulatedSensing:
             known=known,
             unknown_price=variations.unknown_price,
             position_noise=variations.object_noise,
+            range_noise=variations.range_noise,
             margin=world.margin or None,
         )
         self._inbox: deque[tuple[float, LidarScan, Detections]] = deque()

@@ -28,13 +28,16 @@ _MOST_CELLS = 25_000_000
 class ScanMap:
     """Occupancy grid (Moravec and Elfes 1985) whose occupied cells become a `StaticMap`.
 
-    A beam is taken to end half a cell behind what it has hit, so that surfaces are as often drawn
-    too near as too far.
+    A beam is taken to end half a cell and half the noise behind what it has hit, so that surfaces
+    are hardly ever drawn too far and rarely much too near. Where noise spreads what is hit over
+    several cells, a cell gets the mean of what a scan's beams say of it, so that single readings
+    count little.
 
     Args:
         bounds: (4,) x_min, y_min, x_max, y_max of the scene [m].
         cell: side of a cell [m].
         rim: how far the map goes on beyond the bounds, where walls may stand [m].
+        noise: standard deviation of the distances that are measured [m].
 
     Attributes:
         origin: (2,) x, y [m] of the outer corner of cell (0, 0).
@@ -44,10 +47,13 @@ class ScanMap:
         InvalidInputError: if the bounds are empty, or hold more than 25 million cells.
     """
 
-    def __init__(self, bounds: ArrayLike, cell: float, rim: float = 0.0) -> None:
+    def __init__(
+        self, bounds: ArrayLike, cell: float, rim: float = 0.0, noise: float = 0.0
+    ) -> None:
         self._bounds = checked_bounds("bounds", bounds)
         self.cell = number("cell", cell, low=0.0, open_low=True)
         rim = number("rim", rim, low=0.0)
+        self._noise = number("noise", noise, low=0.0)
         self.origin = frozen(self._bounds[:2] - rim)
         extent = self._bounds[2:] - self._bounds[:2] + 2.0 * rim
         sides = [side / self.cell for side in extent.tolist()]
@@ -58,15 +64,18 @@ class ScanMap:
             )
         columns, rows = (math.ceil(side - 1e-9) for side in sides)
         self.log_odds = np.zeros((rows, columns))
-        self._occupied = self._solid = np.zeros((rows, columns), dtype=np.bool_)
+        self._occupied = np.zeros((rows, columns), dtype=np.bool_)
+        self._solid = np.zeros((rows, columns), dtype=np.bool_)
+        self._unseen: BoolArray = frozen(np.ones((rows, columns), dtype=np.bool_))
+        self._changed = _Window(rows, columns)
+        self._closed = False
         self._tiles: dict[tuple[int, int], list[FloatArray]] = {}
         self._static = _plain_map((), self._bounds)
 
     @property
     def unseen(self) -> BoolArray:
         """(rows, columns) cells at which nobody has looked."""
-        hidden: BoolArray = self.log_odds == 0.0
-        return hidden
+        return self._unseen
 
     def add(self, scan: LidarScan, ignored: BoolArray) -> None:
         """Mark a scan.
@@ -77,11 +86,21 @@ class ScanMap:
         """
         hit = np.isfinite(scan.ranges)
         passed = np.where(np.isnan(scan.ranges), 0.0, np.minimum(scan.ranges, scan.range_max))
-        ends = np.where(hit & ~ignored, scan.ranges + 0.5 * self.cell, np.inf)
+        behind = 0.5 * (self.cell + self._noise)
+        ends = np.where(hit & ~ignored, scan.ranges + behind, np.inf)
         left, low = self.origin.tolist()
         x, y, heading = scan.pose.tolist()
         bearings = frozen(heading + scan.bearings)
-        core.mark_scan(self.log_odds, left, low, self.cell, x, y, bearings, passed, ends, _EVIDENCE)
+        averaged = 2.0 * self._noise > self.cell
+        beams = bearings, passed, ends
+        place = left, low, self.cell, x, y
+        window = core.mark_scan(self.log_odds, *place, *beams, _EVIDENCE, averaged)
+        part = self._changed.include(*window)
+        hidden = self.log_odds[part] == 0.0
+        if not np.array_equal(hidden, self._unseen[part]):
+            unseen = self._unseen.copy()
+            unseen[part] = hidden
+            self._unseen = frozen(unseen)
 
     def clear(self, shapes: NDArray[Any], rim: float, inexact: float) -> None:
         """Hold the cells in polygons of Shapely (K,) for free, where they are held for occupied.
@@ -106,6 +125,7 @@ class ScanMap:
                 shapely.dwithin(shape, shapely.points(x, y), rim),
             )
             part[rows[cleared], columns[cleared]] = _EVIDENCE[2]
+            self._changed.include(r0, c0, r1, c1)
 
     def static_map(
         self, *, unknown: str = "free", free: Sequence[shapely.Geometry] = ()
@@ -116,21 +136,27 @@ class ScanMap:
             unknown: ``"free"`` or ``"obstacle"``, what cells count as that nobody has seen.
             free: polygons around which cells are free that nobody has seen, such as the robot.
         """
-        stays = self._occupied & (self.log_odds > _GONE)
-        self._occupied = (self.log_odds > 0.0) | stays
-        solid = self._occupied
-        if unknown == "obstacle":
-            hidden = self.unseen
+        part = self._changed.taken()
+        odds = self.log_odds[part]
+        self._occupied[part] = (odds > 0.0) | (self._occupied[part] & (odds > _GONE))
+        closed = unknown == "obstacle"
+        if closed or self._closed:
+            part = np.s_[:, :]
+        self._closed = closed
+        solid = self._occupied[part]
+        if closed:
+            hidden = self._unseen.copy()
             for shape in free:
                 self._clear_around(hidden, shape)
             solid = solid | hidden
-        changed = np.flatnonzero(solid != self._solid)
-        if not len(changed):
+        rows, columns = np.nonzero(solid != self._solid[part])
+        if not len(rows):
             return self._static
-        rows, columns = np.divmod(changed, solid.shape[1])
-        for tile in set(zip((rows // _TILE).tolist(), (columns // _TILE).tolist(), strict=True)):
-            self._tiles[tile] = self._rectangles(solid, *tile)
-        self._solid = solid
+        self._solid[part] = solid
+        rows = (rows + (part[0].start or 0)) // _TILE
+        columns = (columns + (part[1].start or 0)) // _TILE
+        for tile in set(zip(rows.tolist(), columns.tolist(), strict=True)):
+            self._tiles[tile] = self._rectangles(*tile)
         polygons = [one for tile in sorted(self._tiles) for one in self._tiles[tile]]
         self._static = _plain_map(tuple(polygons), self._bounds)
         return self._static
@@ -147,13 +173,37 @@ class ScanMap:
         cells = left + self.cell * (x + 0.5), low + self.cell * (y + 0.5)
         flags[rows, columns] &= ~shapely.contains_xy(wide, *cells)
 
-    def _rectangles(self, solid: BoolArray, row: int, column: int) -> list[FloatArray]:
+    def _rectangles(self, row: int, column: int) -> list[FloatArray]:
         """Polygons (4, 2) [m] that cover the occupied cells of a tile."""
         corner = _TILE * np.array([row, column])
-        part = solid[corner[0] : corner[0] + _TILE, corner[1] : corner[1] + _TILE]
+        part = self._solid[corner[0] : corner[0] + _TILE, corner[1] : corner[1] + _TILE]
         r0, c0, r1, c1 = (rectangle_cover(part) + np.tile(corner, 2)).T
         points = np.stack([c0, r0, c1, r0, c1, r1, c0, r1], axis=1).reshape(-1, 4, 2)
         return [frozen(one) for one in self.origin + self.cell * points]
+
+
+class _Window:
+    """Rows and columns of a map that have changed."""
+
+    def __init__(self, rows: int, columns: int) -> None:
+        self._none = rows, columns, 0, 0
+        self._sides = self._none
+
+    def include(self, r0: int, c0: int, r1: int, c1: int) -> tuple[slice, slice]:
+        """Note that cells from row and column ``r0``, ``c0`` up to ``r1``, ``c1`` have changed.
+
+        Returns:
+            Indices of those cells.
+        """
+        old = self._sides
+        self._sides = min(old[0], r0), min(old[1], c0), max(old[2], r1), max(old[3], c1)
+        return slice(r0, r1), slice(c0, c1)
+
+    def taken(self) -> tuple[slice, slice]:
+        """Indices of all cells that have changed since the last call."""
+        r0, c0, r1, c1 = self._sides
+        self._sides = self._none
+        return slice(r0, max(r0, r1)), slice(c0, max(c0, c1))
 
 
 def _plain_map(polygons: tuple[FloatArray, ...], bounds: FloatArray) -> StaticMap:

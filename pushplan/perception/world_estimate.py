@@ -40,8 +40,9 @@ class WorldEstimate:
         bounds: (4,) x_min, y_min, x_max, y_max of the scene [m].
         known: what is known to be static; then scans say nothing new of what is static.
         cell: side of the cells of the map [m]; if None an eighth of the robot's inscribed radius,
-            and more where that were more than 4 million cells.
+            and more where scans are less exact or that were more than 4 million cells.
         position_noise: standard deviation of the positions of detected objects [m].
+        range_noise: standard deviation of the distances in scans [m].
         unknown: ``"free"`` or ``"obstacle"``, what counts where nobody has looked.
         unknown_price: price of a metre where nobody has looked, see `pushplan.world.PriceMap`.
         drift: by how much the place of an object becomes uncertain that is not seen [m/√s].
@@ -71,6 +72,7 @@ class WorldEstimate:
         known: StaticMap | None = None,
         cell: float | None = None,
         position_noise: float = 0.0,
+        range_noise: float = 0.0,
         unknown: str = "free",
         unknown_price: float = 0.0,
         drift: float = 0.02,
@@ -86,12 +88,14 @@ class WorldEstimate:
         self._unknown = choice("treatment of unknown cells", unknown, UNKNOWN)
         self._unknown_price = number("unknown_price", unknown_price, low=0.0)
         self._drift = number("drift", drift, low=0.0)
-        self._near = 2.0 * number("position_noise", position_noise, low=0.0)
+        place = number("position_noise", position_noise, low=0.0)
+        range_noise = number("range_noise", range_noise, low=0.0)
+        self._near = 2.0 * math.hypot(place, range_noise)
         if cell is None:
             x0, y0, x1, y1 = checked_bounds("bounds", bounds).tolist()
-            cell = robot.inscribed_radius / _CELLS
+            cell = max(robot.inscribed_radius / _CELLS, range_noise)
             cell = max(cell, math.sqrt((x1 - x0) * (y1 - y0) / _MOST_CELLS))
-        self.map = ScanMap(bounds, cell, robot.circumscribed_radius)
+        self.map = ScanMap(bounds, cell, robot.circumscribed_radius, range_noise)
         if margin is None:
             margin = _INEXACT * self.map.cell * (known is None)
         self._margin = number("margin", margin, low=0.0)

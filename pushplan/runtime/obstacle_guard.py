@@ -13,8 +13,8 @@ from pushplan.control.stopping import add_arc, stopping_path
 from pushplan.core import motion as core
 from pushplan.motion.collision import footprint, obstacles
 from pushplan.runtime.noise_allowance import NoiseAllowance
-from pushplan.world import StaticMap, Twist, World
-from pushplan.world.checks import FloatArray
+from pushplan.world import Plan, StaticMap, Twist, World
+from pushplan.world.checks import FloatArray, frozen
 from pushplan.world.outline import flatten, outline_boxes
 
 _CLEARANCE = 0.02  # kept from what is new, beside the noise [circumscribed radii]
@@ -26,6 +26,7 @@ _HELD = 2.0  # for how long each command may be driven before the next one comes
 _TURNING_STEPS = 25  # in which a turn begins at most
 _FINE = 0.25  # distance between poses of circles, in that of other paths
 _MOVED = 4.0  # distance from its place at which something fixed may be seen [clearances]
+_BESIDE = 0.5  # distance from its plan up to which a robot follows it [circumscribed radii]
 _ANYWHERE = StaticMap.build(bounds=(-1e9, -1e9, 1e9, 1e9))
 
 
@@ -33,8 +34,9 @@ class ObstacleGuard:
     """Looks at each command: the robot has to be able to stop before what is new.
 
     New is what is static, or held not to move, and was not so in each world since the start. All
-    else is left to the policy, which knows it: a guard of it would hinder pushes along walls. A
-    robot that is too near already may drive wherever it comes no nearer.
+    else is left to the policy, which knows it: a guard of it would hinder pushes along walls. So
+    is what is new while the plan that is followed keeps clear of it. A robot that is too near
+    already may drive wherever it comes no nearer.
 
     Args:
         allowance: noise of the poses.
@@ -78,7 +80,9 @@ class ObstacleGuard:
             return world
         return replace(world, margin=max(world.margin, 2.0 * clearance))
 
-    def limited(self, world: World, before: Twist, wanted: Twist, held: float) -> tuple[Twist, str]:
+    def limited(
+        self, world: World, before: Twist, wanted: Twist, held: float, plan: Plan | None = None
+    ) -> tuple[Twist, str]:
         """The velocity to command, and why it is not the wanted one; empty where it is.
 
         Args:
@@ -86,15 +90,18 @@ class ObstacleGuard:
             before: the velocity that is driven then.
             wanted: what the policy asks for.
             held: time since the last command [s].
+            plan: that the policy follows, if any.
         """
         robot = world.robot
         twist = ramp_twist(robot, before, wanted.linear, wanted.angular, held, wanted.lateral)
         near = self._near(world, twist)
+        grown = self._clearance(world) * (_RESUMED if self._stands else 1.0)
+        if near and plan is not None:
+            near = self._unheeded(world, plan, near, grown)
         if not near:
             self._stands = False
             self._side = 0
             return twist, ""
-        grown = self._clearance(world) * (_RESUMED if self._stands else 1.0)
         closeness = _Closeness(footprint(robot, grown), world.robot_pose, near)
         for fraction in _SLOWER if robot.can_stop else (1.0,):
             slower = ramp_twist(
@@ -141,6 +148,26 @@ class ObstacleGuard:
         add_arc(poses, robot.turning_radius * math.tau, side * math.tau, fine)
         return np.array(poses)
 
+    def _unheeded(
+        self, world: World, plan: Plan, near: list[FloatArray], grown: float
+    ) -> list[FloatArray]:
+        """Those outlines from which a plan does not keep away, or all if the robot has left it."""
+        offsets = plan.poses[:, :2] - world.robot_pose[:2]
+        away = np.hypot(*offsets.T)
+        reach = world.robot.circumscribed_radius
+        if away.min() > _BESIDE * reach:
+            return near
+        boxes = outline_boxes(*flatten(near)) - np.tile(world.robot_pose[:2], 2)
+        far = np.hypot(*np.maximum(-boxes[:, :2], boxes[:, 2:]).T).max() + 2.0 * reach
+        poses = frozen(plan.poses[away <= far])
+        shape = footprint(world.robot, grown)
+        return [
+            part
+            for part in near
+            if core.CollisionChecker(shape, obstacles(_ANYWHERE, (part,))).first_blocked(poses)
+            < len(poses)
+        ]
+
     def _near(self, world: World, twist: Twist) -> list[FloatArray]:
         """Outlines of what is new and within reach."""
         if not self._new and not self._new_fixed:
@@ -148,12 +175,12 @@ class ObstacleGuard:
         objects = world.movables
         chosen = np.flatnonzero(np.isin(objects.ids, list(self._new_fixed))).tolist()
         held = [part for k in chosen for part in objects.parts_world(k)]
-        outlines = [*self._new, *held]
-        boxes = outline_boxes(*flatten(outlines))
         path = np.concatenate([path for _, path in self._paths(world, twist)])
         reach = world.robot.circumscribed_radius + 2.0 * _RESUMED * self._clearance(world)
         low = path[:, :2].min(axis=0) - reach
         high = path[:, :2].max(axis=0) + reach
+        outlines = [*self._new, *held]
+        boxes = outline_boxes(*flatten(outlines))
         near = ((boxes[:, 2:] >= low) & (boxes[:, :2] <= high)).all(axis=1)
         return [part for part, is_near in zip(outlines, near, strict=True) if is_near]
 

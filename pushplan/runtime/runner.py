@@ -357,12 +357,12 @@ class Runner:
         chosen, status, reason = self._choose(world, at, at - newest.time, clock)
         wanted = waiting_twist(world) if chosen is None else chosen
         before = driven_twist(newest) if last is None else last.twist
-        twist, obstacle = self._guard.limited(world, before, wanted, held)
+        plan = shown_plan(self.policy)
+        twist, obstacle = self._guard.limited(world, before, wanted, held, plan)
         if obstacle and status in (CommandStatus.DRIVING, CommandStatus.WAITING):
             status = CommandStatus.BLOCKED
             reason = obstacle
         self._estimator.sent(at, twist)
-        plan = shown_plan(self.policy)
         if plan is not self._plan:
             self._plan = plan
             self._planned_at = at

@@ -45,6 +45,11 @@ def to_walls(points: np.ndarray) -> np.ndarray:
     return np.abs(np.abs(points) - [4.0, 3.0]).min(axis=1)
 
 
+def inside(points: np.ndarray) -> np.ndarray:
+    """(N,) how far points (N, 2) lie inside the hall [m]."""
+    return ([4.0, 3.0] - np.abs(points)).min(axis=1)
+
+
 def estimate(**options) -> WorldEstimate:
     return WorldEstimate(ROBOT, GOAL, HALL, cell=0.05, **options)
 
@@ -165,6 +170,41 @@ class TestScanMap:
             len(part) for part in chart.static_map().polygons
         )
 
+    @pytest.mark.parametrize("cell", [0.01, 0.02])
+    def test_noise_of_several_cells_makes_no_walls(self, cell):
+        noise = 0.02
+        chart = ScanMap(HALL, cell, 0.3, noise)
+        rng = np.random.default_rng(3)
+        for k in range(60):
+            there = hall(at=(-3.5, 0.1 * k - 3.0, 0.1 * k))
+            scan = Lidar(noise=noise, drop_out=0.2).scan(there, rng)
+            chart.add(scan, np.zeros(len(scan.bearings), dtype=bool))
+            static = chart.static_map()
+        hits = shapely.union_all(shapely.polygons(list(static.polygons)))
+        assert np.quantile(inside(static.packed[0]), 0.99) < 1.6 * noise
+        scan = Lidar(beams=90).scan(there)
+        assert np.quantile(shapely.distance(hits, shapely.points(scan.points)), 0.95) < 2.5 * noise
+
+    @given(seed=st.integers(0, 1000))
+    def test_the_map_of_all_scans_is_that_of_one_scan_after_another(self, seed):
+        rng = np.random.default_rng(seed)
+        charts = [ScanMap(HALL, 0.1, 0.3, 0.01) for _ in range(2)]
+        for _ in range(5):
+            at = (*rng.uniform(-2.0, 2.0, 2), rng.uniform(-3.0, 3.0))
+            scan = Lidar(beams=90, range=2.5, noise=0.3).scan(hall(at=at), rng)
+            for k, chart in enumerate(charts):
+                chart.add(scan, np.zeros(len(scan.bearings), dtype=bool))
+                if k == 0 and rng.random() < 0.5:
+                    chart.static_map(unknown=str(rng.choice(["free", "obstacle"])))
+        first, second = charts
+        assert np.array_equal(first.unseen, first.log_odds == 0.0)
+        assert np.array_equal(first.log_odds, second.log_odds)
+        solid = shapely.union_all(shapely.polygons(list(first.static_map().polygons)))
+        rows, columns = np.indices(first.log_odds.shape)
+        x, y = first.origin[:, None, None] + 0.1 * (np.array([columns, rows]) + 0.5)
+        within = shapely.contains_xy(solid, x, y)
+        assert within[first.log_odds > 0.0].all() and not within[first.log_odds <= -1.0].any()
+
     def test_too_many_cells_are_refused(self):
         for cell in (1e-4, 1e-320):
             with pytest.raises(InvalidInputError, match="use larger cells"):
@@ -284,6 +324,20 @@ class TestWorldEstimate:
         old = Detector().detect(hall([(2.0, 0.0, 0.0)], time=1.0))
         belief.add_detections(old)
         assert belief.objects.poses[0, 0] == 1.0
+
+    @pytest.mark.parametrize("noise", [0.01, 0.03])
+    def test_an_object_that_is_seen_with_noise_is_no_wall(self, noise):
+        belief = WorldEstimate(
+            ROBOT, GOAL, HALL, cell=0.01, position_noise=noise, range_noise=noise
+        )
+        detector = Detector(position_noise=noise, heading_noise=noise)
+        rng = np.random.default_rng(2)
+        for time in range(30):
+            there = hall([(1.0, 0.3, 0.2)], at=(-1.0 + 0.02 * time, 0.0, 0.0), time=time)
+            belief.add_detections(detector.detect(there, rng))
+            belief.add_scan(Lidar(noise=noise).scan(there, rng))
+        static = belief.world(there.robot_pose, None, there.time).static
+        assert (inside(static.packed[0]) > 0.3).mean() < 0.01
 
     def test_noise_moves_walls_little(self):
         belief = estimate()

@@ -302,6 +302,18 @@ def test_what_was_there_at_the_start_is_left_to_the_policy() -> None:
     assert driven.overlap(block) > 0.0
 
 
+def test_what_comes_beside_the_plan_is_left_to_the_policy() -> None:
+    """A robot that cannot stop has no room to circle between walls that it sees late."""
+    car = replace(ROBOT, drive=Drive.CONSTANT_SPEED, max_speed=0.4, min_speed=0.4)
+    driven = DrivenRobot("straight", room(car))
+    walls = [square_at(x, y) for x in np.arange(3.0, 7.0, 0.35) for y in (2.4, 3.6)]
+    change = when_at(2.0, lambda world: adding(world, *walls))
+    assert driven.drive(400, change).status is CommandStatus.DONE
+    assert all(driven.overlap(one) == 0.0 for one in walls)
+    blocked = [one for one in driven.commands if one.status is CommandStatus.BLOCKED]
+    assert len(blocked) < 5
+
+
 def test_a_map_that_is_perceived_anew_each_time_costs_no_plan(monkeypatch) -> None:
     rng = np.random.default_rng(0)
     exact = DrivenRobot.seen

@@ -9,38 +9,49 @@
 namespace pushplan {
 namespace {
 
-/// A cell beside one that is hit stays as it is: beams that graze a wall pass its cells.
-enum class Mark : std::uint8_t { none, passed, beside, hit };
+/// Beams of one scan in a cell, and ends of beams beside it.
+struct Beams {
+  std::uint32_t passed = 0;
+  std::uint32_t hits = 0;
+  std::uint32_t beside = 0;
+};
 
-/// Marks of one scan.
+/// Beams of one scan in the cells that it may change.
 class Marks {
  public:
-  explicit Marks(const LogOdds& map)
-      : map_(map), marks_(static_cast<std::size_t>(map.values.size()), Mark::none) {
-    cells_.reserve(marks_.size());
-  }
+  Marks(const LogOdds& map, const CellWindow& window)
+      : map_(map), window_(window), columns_(window.end_column - window.column),
+        beams_(static_cast<std::size_t>((window.end_row - window.row) * columns_)) {}
 
-  void put(Index cell, Mark mark) {
-    Mark& old = marks_[static_cast<std::size_t>(cell)];
-    if (old == Mark::none) cells_.push_back(cell);
-    old = std::max(old, mark);
+  Beams& at(Index row, Index column) {
+    const Index cell = (row - window_.row) * columns_ + column - window_.column;
+    return beams_[static_cast<std::size_t>(cell)];
   }
 
   void apply(const ScanEvidence& evidence) {
-    for (const Index cell : cells_) {
-      double& value = map_.values.data()[cell];
-      const Mark mark = marks_[static_cast<std::size_t>(cell)];
-      if (mark == Mark::beside) continue;
-      const double change = mark == Mark::hit ? evidence.hit : evidence.miss;
-      value = std::clamp(value + change, evidence.lowest, evidence.highest);
-      if (value == 0.0) value = -std::numeric_limits<double>::min();
+    auto beams = beams_.begin();
+    for (Index row = window_.row; row < window_.end_row; ++row) {
+      double* value = map_.values.data() + row * map_.values.extent(1) + window_.column;
+      for (Index column = 0; column < columns_; ++column, ++value, ++beams) {
+        const double all = beams->passed + beams->hits;
+        if (all == 0.0) continue;
+        double change = beams->hits > 0 ? evidence.hit : evidence.miss;
+        if (evidence.averaged) {
+          change = (beams->hits * evidence.hit + beams->passed * evidence.miss) / all;
+        } else if (beams->hits == 0 && beams->beside > 0) {
+          continue;  // beams that graze a wall pass its cells
+        }
+        *value = std::clamp(*value + change, evidence.lowest, evidence.highest);
+        if (*value == 0.0) *value = -std::numeric_limits<double>::min();
+      }
     }
   }
 
  private:
   LogOdds map_;
-  std::vector<Mark> marks_;
-  std::vector<Index> cells_;
+  CellWindow window_;
+  Index columns_;
+  std::vector<Beams> beams_;
 };
 
 /// Rows or columns along a ray, one after another (Amanatides and Woo 1987).
@@ -62,17 +73,36 @@ struct Walk {
     next += interval;
   }
 
-  bool is_in(Index count) const { return 0 <= at && at < count; }
+  bool is_in(Index low, Index high) const { return low <= at && at < high; }
 };
+
+/// The cells of a map up to one beyond the ends of all beams.
+CellWindow window_of(const LogOdds& map, const Vec2& from, std::span<const double> bearings,
+                     std::span<const double> passed, std::span<const double> hits) {
+  Vec2 low = from;
+  Vec2 high = from;
+  for (std::size_t beam = 0; beam < bearings.size(); ++beam) {
+    const double away = std::max(passed[beam], std::isfinite(hits[beam]) ? hits[beam] : 0.0);
+    const Vec2 end{from.x + away * std::cos(bearings[beam]), from.y + away * std::sin(bearings[beam])};
+    low = {std::min(low.x, end.x), std::min(low.y, end.y)};
+    high = {std::max(high.x, end.x), std::max(high.y, end.y)};
+  }
+  const auto cell = [&](double place, double corner, Index beyond, Index count) {
+    return std::clamp<Index>(floor_index((place - corner) / map.side) + beyond, 0, count);
+  };
+  const Index rows = map.values.extent(0);
+  const Index columns = map.values.extent(1);
+  return {cell(low.y, map.corner.y, -1, rows), cell(low.x, map.corner.x, -1, columns),
+          cell(high.y, map.corner.y, 2, rows), cell(high.x, map.corner.x, 2, columns)};
+}
 
 }  // namespace
 
-void mark_scan(const LogOdds& map, const Vec2& from, std::span<const double> bearings,
+CellWindow mark_scan(const LogOdds& map, const Vec2& from, std::span<const double> bearings,
                std::span<const double> passed, std::span<const double> hits,
                const ScanEvidence& evidence) {
-  Marks marks(map);
-  const Index rows = map.values.extent(0);
-  const Index columns = map.values.extent(1);
+  const CellWindow window = window_of(map, from, bearings, passed, hits);
+  Marks marks(map, window);
   const double x = (from.x - map.corner.x) / map.side;
   const double y = (from.y - map.corner.y) / map.side;
   for (std::size_t beam = 0; beam < bearings.size(); ++beam) {
@@ -80,8 +110,9 @@ void mark_scan(const LogOdds& map, const Vec2& from, std::span<const double> bea
     const double end = passed[beam] / map.side;
     Walk column(x, along.x);
     Walk row(y, along.y);
-    for (double way = 0.0; way < end && column.is_in(columns) && row.is_in(rows);) {
-      marks.put(row.at * columns + column.at, Mark::passed);
+    for (double way = 0.0; way < end && column.is_in(window.column, window.end_column) &&
+                           row.is_in(window.row, window.end_row);) {
+      ++marks.at(row.at, column.at).passed;
       way = std::min(column.next, row.next);
       (column.next < row.next ? column : row).advance();
     }
@@ -89,15 +120,16 @@ void mark_scan(const LogOdds& map, const Vec2& from, std::span<const double> bea
     const double away = hits[beam] / map.side;
     const Index hit_row = floor_index(y + away * along.y);
     const Index hit_column = floor_index(x + away * along.x);
-    for (Index i = std::max<Index>(hit_row - 1, 0); i <= std::min(hit_row + 1, rows - 1); ++i) {
-      for (Index j = std::max<Index>(hit_column - 1, 0);
-           j <= std::min(hit_column + 1, columns - 1); ++j) {
+    for (Index i = std::max(hit_row - 1, window.row); i < std::min(hit_row + 2, window.end_row); ++i) {
+      for (Index j = std::max(hit_column - 1, window.column);
+           j < std::min(hit_column + 2, window.end_column); ++j) {
         const bool is_it = i == hit_row && j == hit_column;
-        marks.put(i * columns + j, is_it ? Mark::hit : Mark::beside);
+        ++(is_it ? marks.at(i, j).hits : marks.at(i, j).beside);
       }
     }
   }
   marks.apply(evidence);
+  return window;
 }
 
 }  // namespace pushplan

@@ -213,7 +213,8 @@ class PlanFollower:
             held = self._clock.held
             path = stopping_path(world.robot, world.robot_pose, driven_twist(world), held, held)
             world = world.moved(robot_pose=path[-1], robot_twist=np.zeros(3))  # after braking
-        start, stretch = world_ahead(world, plan, now, latency, self.interaction)
+        off = reason is Reason.OFFSET
+        start, stretch = world_ahead(world, plan, now, latency, self.interaction, off_plan=off)
         self._planned = world
         comparison = None
         # from a tight curve into a pose a new plan may have to come round again

@@ -14,6 +14,7 @@ from pushplan.interaction import InteractionModel
 from pushplan.planners.following.replanning import poses_at
 from pushplan.world import Plan, World
 from pushplan.world.checks import FloatArray
+from pushplan.world.outline import transform
 from pushplan.world.polyline import path_length
 
 _SPACING = 0.15  # distance between the poses of a stretch without a plan [R]
@@ -25,6 +26,8 @@ def world_ahead(
     now: float,
     latency: float,
     interaction: InteractionModel,
+    *,
+    off_plan: bool = False,
 ) -> tuple[World, Plan | None]:
     """The world after some more time on the present plan, and the plan of that stretch.
 
@@ -36,6 +39,7 @@ def world_ahead(
         now: how far on it the robot is, by its times [s].
         latency: how far to look ahead [s].
         interaction: predicts the objects.
+        off_plan: the robot has left the plan, and does from where it is what the plan does.
 
     Returns:
         The predicted world, and the plan of the stretch; ``world`` itself and None where there is
@@ -43,7 +47,7 @@ def world_ahead(
     """
     if latency <= 0.0:
         return world, None
-    times, poses, twists = _stretch(world, plan, now, latency)
+    times, poses, twists = _stretch(world, plan, now, latency, off_plan)
     swept = interaction.sweep(world, np.concatenate([world.robot_pose[None], poses[1:]]))
     if swept.jammed_at >= 0:
         return world, None
@@ -104,7 +108,7 @@ def passed(world: World, plan: Plan, seconds: float) -> int:
 
 
 def _stretch(
-    world: World, plan: Plan | None, now: float, latency: float
+    world: World, plan: Plan | None, now: float, latency: float, off_plan: bool
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Times from now (N,), poses (N, 3) and twists (N, 2) over the next ``latency`` seconds."""
     if plan is None:
@@ -113,6 +117,11 @@ def _stretch(
         twists = np.array([[world.robot.min_speed, 0.0]])
     else:
         times, poses, twists = _on_plan(plan, now, latency)
+        if off_plan:
+            turned = world.robot_pose - poses[0]
+            offsets = poses[:, :2] - poses[0, :2]
+            places = transform(np.append(world.robot_pose[:2], turned[2]), offsets)
+            poses = np.column_stack([places, poses[:, 2] + turned[2]])
     left = latency - float(times[-1])
     if left <= 1e-9:
         return times, poses, twists

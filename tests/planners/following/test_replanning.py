@@ -263,6 +263,13 @@ class TestStitching:
         assert stretch.times[-1] == pytest.approx(10.0)
         assert stretch.poses[-1] == pytest.approx([1.5, 0, 0])
 
+    def test_a_robot_that_has_left_the_plan_does_the_same_from_where_it_is(self):
+        plan = line_plan(floor())
+        world = floor(robot_pose=[0.3, 1.0, math.pi / 2.0])
+        ahead, stretch = world_ahead(world, plan, 2.0, 10.0, MODEL, off_plan=True)
+        assert stretch.poses[0] == pytest.approx([0.3, 1.0, math.pi / 2.0])
+        assert ahead.robot_pose == pytest.approx([0.3, 2.5, math.pi / 2.0])
+
     def test_no_latency_is_no_stretch(self):
         world = floor()
         assert world_ahead(world, line_plan(world), 0.0, 0.0, MODEL) == (world, None)

@@ -20,12 +20,22 @@ struct ScanEvidence {
   double miss;    // added to every cell that a beam has passed, and in or beside which none ends
   double lowest;  // least log-odds of a cell
   double highest;
+  bool averaged;  // a cell gets the mean of its beams: for noise that spreads over several cells
+};
+
+/// Cells from the first up to, not including, the last.
+struct CellWindow {
+  Index row;
+  Index column;
+  Index end_row;
+  Index end_column;
 };
 
 /// Marks beams from a point, each once in a cell. A beam is free up to `passed` [m], where it has
 /// one; it ends in a cell at `hits` [m], unless that is infinite. Bearings are those of the world.
-void mark_scan(const LogOdds& map, const Vec2& from, std::span<const double> bearings,
-               std::span<const double> passed, std::span<const double> hits,
-               const ScanEvidence& evidence);
+/// Returns the cells that may have changed.
+CellWindow mark_scan(const LogOdds& map, const Vec2& from, std::span<const double> bearings,
+                     std::span<const double> passed, std::span<const double> hits,
+                     const ScanEvidence& evidence);
 
 }  // namespace pushplan
