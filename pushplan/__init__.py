@@ -1,3 +1,3 @@
 """pushplan: planning and optimization baselines for robots that push things."""
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"

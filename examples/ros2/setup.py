@@ -9,7 +9,7 @@ SHARE = f"share/{NAME}"
 
 setup(
     name=NAME,
-    version="0.2.0",
+    version="0.3.0",
     packages=[],
     py_modules=[],
     data_files=[
