@@ -9,7 +9,7 @@ import numpy as np
 
 from pushplan.envs.tasks.variations import TaskVariations
 from pushplan.perception import Detections, Detector, Lidar, LidarScan, WorldEstimate
-from pushplan.perception.lidar import DEFAULT_RANGE
+from pushplan.perception.lidar import sensor_range
 from pushplan.world import Twist, World
 
 
@@ -30,7 +30,7 @@ class SimulatedSensing:
     """
 
     def __init__(self, variations: TaskVariations, world: World, rng: np.random.Generator) -> None:
-        far = variations.view_range or DEFAULT_RANGE * world.robot.circumscribed_radius
+        far = sensor_range(world.robot, variations.view_range)
         angle = variations.view_angle
         self._lidar = Lidar(
             field_of_view=angle,

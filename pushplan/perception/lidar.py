@@ -12,7 +12,7 @@ import numpy as np
 from pushplan.core import geometry
 from pushplan.core import perception as core
 from pushplan.errors import short
-from pushplan.world import InvalidInputError, Movables, World
+from pushplan.world import InvalidInputError, Movables, RobotModel, World
 from pushplan.world.checked_fields import (
     CheckedFields,
     Fraction,
@@ -23,8 +23,7 @@ from pushplan.world.checked_fields import (
 )
 from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, IntArray, frozen
 
-DEFAULT_RANGE = 30.0
-"""Range of the sensors of a robot by default [circumscribed radii]."""
+_DEFAULT_RANGE = 30.0  # of the sensors of a robot [circumscribed radii]
 Angle = Annotated[float, Limits(0.0, math.tau, open_low=True)]
 
 
@@ -134,6 +133,11 @@ def ray_lengths(
     for vertices, offsets in outlines:
         core.cast_rays(lengths, x, y, heading, vertices, offsets)
     return lengths
+
+
+def sensor_range(robot: RobotModel, chosen: float | None) -> float:
+    """How far the sensors of a robot see [m]; 30 of its circumscribed radii if nobody chose."""
+    return chosen or _DEFAULT_RANGE * robot.circumscribed_radius
 
 
 def object_outlines(objects: Movables) -> tuple[FloatArray, IntArray]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pushplan.observation.builder import LimitedVector
 from pushplan.observation.state import goal_point
-from pushplan.perception.lidar import DEFAULT_RANGE, Lidar, LidarScan
+from pushplan.perception.lidar import Lidar, LidarScan, sensor_range
 from pushplan.world import RobotModel, World
 from pushplan.world.checked_fields import CheckedFields, Limits, PositiveFloat
 
@@ -69,5 +69,5 @@ class LidarObservation(LimitedVector, CheckedFields):
 
 
 def builder_for(robot: RobotModel, far: float | None) -> LidarObservation:
-    """The observation of a robot whose sensors see so far [m]; 30 of its radii if None."""
-    return LidarObservation(range=far or DEFAULT_RANGE * robot.circumscribed_radius)
+    """The observation of a robot whose sensors see so far [m]."""
+    return LidarObservation(range=sensor_range(robot, far))

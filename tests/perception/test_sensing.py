@@ -170,21 +170,21 @@ class TestScanMap:
             len(part) for part in chart.static_map().polygons
         )
 
-    @pytest.mark.parametrize("cell", [0.01, 0.02])
-    def test_noise_of_several_cells_makes_no_walls(self, cell):
+    def test_noise_of_a_cell_makes_no_walls(self):
         noise = 0.02
-        chart = ScanMap(HALL, cell, 0.3, noise)
+        chart = ScanMap(HALL, 0.02, 0.3, noise)
         rng = np.random.default_rng(3)
         for k in range(60):
             there = hall(at=(-3.5, 0.1 * k - 3.0, 0.1 * k))
             scan = Lidar(noise=noise, drop_out=0.2).scan(there, rng)
             chart.add(scan, np.zeros(len(scan.bearings), dtype=bool))
-            static = chart.static_map()
+        static = chart.static_map()
         hits = shapely.union_all(shapely.polygons(list(static.polygons)))
         assert np.quantile(inside(static.packed[0]), 0.99) < 1.6 * noise
         scan = Lidar(beams=90).scan(there)
         assert np.quantile(shapely.distance(hits, shapely.points(scan.points)), 0.95) < 2.5 * noise
 
+    @settings(max_examples=10)
     @given(seed=st.integers(0, 1000))
     def test_the_map_of_all_scans_is_that_of_one_scan_after_another(self, seed):
         rng = np.random.default_rng(seed)

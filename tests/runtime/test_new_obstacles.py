@@ -306,7 +306,7 @@ def test_what_comes_beside_the_plan_is_left_to_the_policy() -> None:
     """A robot that cannot stop has no room to circle between walls that it sees late."""
     car = replace(ROBOT, drive=Drive.CONSTANT_SPEED, max_speed=0.4, min_speed=0.4)
     driven = DrivenRobot("straight", room(car))
-    walls = [square_at(x, y) for x in np.arange(3.0, 7.0, 0.35) for y in (2.4, 3.6)]
+    walls = [square_at(x, y) for x in np.arange(3.0, 5.0, 0.45) for y in (2.4, 3.6)]
     change = when_at(2.0, lambda world: adding(world, *walls))
     assert driven.drive(400, change).status is CommandStatus.DONE
     assert all(driven.overlap(one) == 0.0 for one in walls)

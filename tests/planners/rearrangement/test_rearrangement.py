@@ -526,7 +526,7 @@ def test_the_search_is_that_of_dijkstra():
             if not shut[node] and np.isfinite(best[other]):
                 touched = near[node] > 0.0 and flat[node] >= flat[other]
                 cost = best[other] + (step_cost + motion * near[node] if touched else step_cost)
-                assert best[node] <= cost
+                assert best[node] <= cost * (1.0 + 1e-12)  # other order of the same sum
                 assert before[node] != other or best[node] == pytest.approx(cost)
 
 
