@@ -38,6 +38,7 @@ def call_wrongly(rooms: list[str], random_calls: int, log: Path) -> None:
         assert counts["results"] > random_calls / 10, room
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first", range(3))
 def test_wrong_arguments_of_bindings_are_refused_or_give_a_result(
     first: int, tmp_path: Path

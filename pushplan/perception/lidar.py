@@ -136,7 +136,7 @@ def ray_lengths(
 
 
 def sensor_range(robot: RobotModel, chosen: float | None) -> float:
-    """How far the sensors of a robot see [m]; 30 of its circumscribed radii if nobody chose."""
+    """Range of the sensors of a robot [m]; 30 of its circumscribed radii if nobody chose."""
     return chosen or _DEFAULT_RANGE * robot.circumscribed_radius
 
 

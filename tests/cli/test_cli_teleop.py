@@ -154,6 +154,7 @@ def test_an_episode_is_recorded_as_driven(tmp_path: Path) -> None:
     assert heading[-1] > heading[0] + 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", [0.5, 8.0])
 def test_simulated_time_keeps_pace_with_the_clock(speed: float) -> None:
     episode, script = play((0.0, "Up"), (2.0, "q"), speed=speed, boxes=0)
@@ -193,6 +194,7 @@ def test_closing_the_window_keeps_the_episode(when: float) -> None:
     compute(episode)
 
 
+@pytest.mark.slow
 def test_an_episode_that_ends_by_itself_shows_its_scores_and_waits() -> None:
     episode, script = play((0.0, "Up"), (60.0, "q"), speed=20.0, boxes=0)
     assert (episode.success, episode.reason) == (False, "wall")

@@ -155,6 +155,7 @@ def test_what_a_machine_reads_is_json_on_demand() -> None:
     assert without == {*writers, "describe"}
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("empty_figures")
 def test_commands_print_one_json_value_and_nothing_else(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -217,6 +218,7 @@ def test_score_says_what_another_file_is(
         assert text.count("\n") == 1 and said in text
 
 
+@pytest.mark.slow
 def test_doctor(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     assert main(["doctor", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)

@@ -146,6 +146,7 @@ def test_same_seed_same_episode_whatever_came_before(name):
     assert drive(one, 6) != first
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WORLDS)
 def test_two_instances_share_nothing(name):
     one, other = make(name), make(name)
@@ -322,6 +323,7 @@ def test_there_is_an_action_mode_for_every_name_that_a_task_gives():
         assert set(look_up("task", TASKS, task).actions) <= set(ACTIONS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("task", "simulator", "preset"), list(worlds()))
 def test_a_seed_is_the_same_start_for_every_action(task, simulator, preset):
     kind = look_up("task", TASKS, task)

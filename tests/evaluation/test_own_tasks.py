@@ -100,6 +100,7 @@ def test_it_runs_wherever_a_task_is_given(capsys: pytest.CaptureFixture[str]) ->
     assert [row.split(",")[4] for row in rows] == ["seed", "0", "1"]
 
 
+@pytest.mark.slow
 def test_a_study_names_it_and_a_robot_beside_itself(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

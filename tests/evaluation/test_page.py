@@ -73,6 +73,7 @@ def opened(browser: Any, folder: Path) -> Iterator[Opened]:
     assert all(url.startswith("file:") for url in one.asked)
 
 
+@pytest.mark.slow
 def test_filters_and_sorting(opened: Opened) -> None:
     page = opened.page
     assert opened.cells(2) == ["success"] * 3

@@ -191,6 +191,7 @@ def test_the_table_shows_means_spreads_and_intervals(results: Results) -> None:
     assert max(map(len, results.table(width=90, settings=True).splitlines())) <= 90
 
 
+@pytest.mark.slow
 def test_report_files(results: Results, monkeypatch: pytest.MonkeyPatch) -> None:
     page = results.report()
     folder = page.parent

@@ -164,6 +164,7 @@ class TestVerify:
         rows = Results.load(stored).rows
         assert all(one.stored in rows for one in (*found.checked, *other.checked))
 
+    @pytest.mark.slow
     def test_what_differs_is_said_with_both_values(
         self, stored: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
     ) -> None:
@@ -181,6 +182,7 @@ class TestVerify:
         (bad,) = [one for one in checked if not one["same"]]
         assert bad["differing"] == ["E_nav"] and bad["again"]["E_nav"] == row.E_nav
 
+    @pytest.mark.slow
     def test_a_run_without_episodes_is_compared_by_its_rows(self, tmp_path: Path) -> None:
         starts = (Scenario("maze", variations={"boxes": 1}),)
         straight = (PolicySpec("straight", "straight"),)

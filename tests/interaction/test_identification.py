@@ -64,6 +64,7 @@ def pushes_by(
     return made
 
 
+@pytest.mark.slow
 @settings(max_examples=2)
 @given(
     friction=st.floats(0.1, 0.55),  # beyond the steepest push none slides

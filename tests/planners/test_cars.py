@@ -39,6 +39,7 @@ def hall(robot, heading, movables=None, **other):
     return World(robot, [8.0, 3.0, 0.3], static, movables or Movables.empty(), goal)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("heading", BEHIND)
 @pytest.mark.parametrize("kind", CARS)
 @pytest.mark.parametrize("planner", PLANNERS)

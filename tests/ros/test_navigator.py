@@ -201,6 +201,7 @@ def test_another_path_is_taken_up_without_a_stop():
     assert math.dist(robot.pose[:2], (3.0, 2.2)) <= 0.1
 
 
+@pytest.mark.slow
 def test_a_policy_drives_on_plans_of_its_own():
     robot = Robot()
     path = robot.path(3.0, 0.75)
@@ -323,6 +324,7 @@ def test_a_path_that_passes_its_own_end_is_driven_to_its_end(shape, stamp):
 BLOCK = (slice(24, 37), slice(40, 44))  # x 2 to 2.2 m, y 1.2 to 1.85 m
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("controller", ["", "straight"])
 def test_a_robot_stops_or_drives_around_what_comes_into_its_path(controller):
     path, _ = given_path([(0.5, 1.5), (3.5, 1.5)])

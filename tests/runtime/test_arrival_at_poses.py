@@ -48,6 +48,7 @@ def rest(world, name, noise=(0.0, 0.0), seconds=60.0):
     return true
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [(0.0, 0.0), (0.005, 0.01)])
 @pytest.mark.parametrize(
     ("drive", "limits"),

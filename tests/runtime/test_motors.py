@@ -92,6 +92,7 @@ def ended(tmp_path_factory):
     return {end: (code, (folder / end).read_text()) for end, code in zip(ENDS, codes, strict=True)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("end", ENDS)
 def test_zero_is_sent_last_whatever_ends_the_program(end, ended):
     code, text = ended[end]

@@ -39,6 +39,7 @@ def command(*arguments: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
         process.communicate()
 
 
+@pytest.mark.slow
 def test_the_command_serves_the_client_that_is_shipped_until_a_signal(tmp_path):
     path = tmp_path / "s"
     address = f"unix:{path}"

@@ -212,6 +212,7 @@ print(episode.actions.ravel().tolist())
         two = train_policy(config, tmp_path / "two", device="cpu", processes=True)
         assert np.array_equal(behaviour(one), behaviour(two))
 
+    @pytest.mark.slow
     def test_another_training_in_the_folder(self, tmp_path, data):
         trained(tiny("bc", validation=0), tmp_path, data, until=lambda done: done == 1)
         with pytest.raises(InvalidInputError, match="its seed is 0, not 1"):

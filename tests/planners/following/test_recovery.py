@@ -201,6 +201,7 @@ def test_a_recovery_drives_into_no_wall():
         assert np.abs(robot.world.robot_pose - pose).max() > 0.5 * shape.radius
 
 
+@pytest.mark.slow
 def test_without_a_plan_it_recovers_a_few_times_and_is_stuck():
     robot = Unicycle(maze_testbed(5017), 0.1, effect=0.0)
     policy = follower(np.inf)

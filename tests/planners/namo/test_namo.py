@@ -204,6 +204,7 @@ def test_a_robot_that_cannot_turn_does_not_get_free_through_a_wall() -> None:
     assert search() is None  # its distances are large: they do not wait for the garbage collector
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("cpu_time")
 def test_an_open_way_is_found_within_the_deadline() -> None:
     places = np.random.default_rng(0).uniform(2.0, 40.0, (2, 40)).T

@@ -172,6 +172,7 @@ def test_the_same_scene_gives_the_same_commands() -> None:
     assert one == other
 
 
+@pytest.mark.slow
 def test_boxes_that_stand_in_each_others_places_swap_them() -> None:
     world, _ = drive(GtspMpc(), objects=2, arrangement="swapped")
     assert world.completed.all()
