@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tempfile
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -177,12 +178,13 @@ def stress(
     jobs = []
     for label, condition in wanted.items():
         period = 1.0 / (condition.rate or rate)
-        make = partial(_disturbed, spec, condition.disturbances, period, planning_time)
         changes = {**condition.variations, "control_step": period}
-        tried = PolicySpec(label, make)
         for scenario in scenarios:
-            varied = replace(scenario, variations=Variations({**scenario.variations, **changes}))
-            jobs.append(Job(tried, varied))
+            variations = {**scenario.variations, **changes}
+            noise = variations.get("object_noise", 0.0), variations.get("turn_noise", 0.0)
+            make = partial(_disturbed, spec, condition.disturbances, period, planning_time, noise)
+            varied = replace(scenario, variations=Variations(variations))
+            jobs.append(Job(PolicySpec(label, make), varied))
     jobs.sort(key=lambda job: job.key[2])  # a test that is cut short still compares conditions
     with tempfile.TemporaryDirectory(prefix="pushplan-") as temporary:
         rows = run_batch(
@@ -203,9 +205,21 @@ def stress(
 
 
 def _disturbed(
-    spec: PolicySpec, disturbances: Disturbances, period: float, planning_time: float
+    spec: PolicySpec,
+    disturbances: Disturbances,
+    period: float,
+    planning_time: float,
+    sensor_noise: tuple[float, float],
 ) -> DisturbedPolicy:
-    return DisturbedPolicy(spec.make(), disturbances, period=period, planning_time=planning_time)
+    place, heading = disturbances.position_noise, disturbances.heading_noise
+    return DisturbedPolicy(
+        spec.make(),
+        disturbances,
+        period=period,
+        planning_time=planning_time,
+        position_noise=math.hypot(place, sensor_noise[0]),
+        heading_noise=math.hypot(heading, sensor_noise[1]),
+    )
 
 
 def _conditions(

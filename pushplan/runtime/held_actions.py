@@ -12,6 +12,7 @@ from pushplan.planners import make_policy, policy_for
 from pushplan.world import (
     ChoosesActions,
     ChoosesObservation,
+    ExpectsNoise,
     InvalidInputError,
     PendingResult,
     Planner,
@@ -53,6 +54,11 @@ class HeldActions:
         self._pending: PendingResult[Any] | None = None
         self._twist = Twist(0.0, 0.0)
         self._since = -np.inf
+
+    def expect_noise(self, position: float, heading: float) -> None:
+        """See `pushplan.world.ExpectsNoise`; a policy that does not want to know is not told."""
+        if isinstance(self._policy, ExpectsNoise):
+            self._policy.expect_noise(position, heading)
 
     def reset(self, world: World, rng: np.random.Generator) -> None:
         """Forget the last episode."""

@@ -75,6 +75,26 @@ def test_conditions_of_sensors_change_what_a_robot_with_sensors_sees():
     assert len(set(lengths.values())) == 4 and not any("wall" in row.ends for row in sheet.rows)
 
 
+def test_a_policy_is_told_the_noise_of_sensors():
+    told = []
+
+    class Ahead:
+        actions = ("velocity",)
+
+        def reset(self, world, rng):
+            told.append((0.0, 0.0))
+
+        def expect_noise(self, position, heading):
+            told.append((position, heading))
+
+        def act(self, world, observation=None):
+            return Twist(0.3, 0.0)
+
+    given = {"conditions": ["sensor-noise"], "episodes": 1, "workers": 0}
+    stress(Ahead, "maze-3d-6-lidar", **given)
+    assert told[0] == (0.0, 0.0) and any(0.0 < place < 0.02 for place, _ in told)
+
+
 def test_under_unknown_parameters_a_policy_is_told_the_nominal_ones():
     episodes = []
 
