@@ -211,14 +211,13 @@ def _disturbed(
     planning_time: float,
     sensor_noise: tuple[float, float],
 ) -> DisturbedPolicy:
-    place, heading = disturbances.position_noise, disturbances.heading_noise
     return DisturbedPolicy(
         spec.make(),
         disturbances,
         period=period,
         planning_time=planning_time,
-        position_noise=math.hypot(place, sensor_noise[0]),
-        heading_noise=math.hypot(heading, sensor_noise[1]),
+        position_noise=math.hypot(disturbances.position_noise, sensor_noise[0]),
+        heading_noise=math.hypot(disturbances.heading_noise, sensor_noise[1]),
     )
 
 
