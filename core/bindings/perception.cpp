@@ -36,8 +36,7 @@ void bind_perception(nb::module_& module) {
       },
       "values"_a.noconvert(), "corner_x"_a, "corner_y"_a, "side"_a, "x"_a, "y"_a,
       "bearings"_a.noconvert(), "passed"_a.noconvert(), "hits"_a.noconvert(), "evidence"_a.noconvert(),
-      "averaged"_a,
-      ReleaseGil());
+      "averaged"_a, ReleaseGil());
 }
 
 }  // namespace pushplan::bindings

@@ -159,6 +159,14 @@ class TestScanMap:
         assert (on_walls | on_column).all() and on_column.any() and on_walls.any()
         assert chart.static_map() is static
 
+    @pytest.mark.parametrize("far", [1e6, 1e300])
+    def test_beams_that_leave_the_map_are_free_up_to_its_end(self, far):
+        chart = ScanMap(HALL, 0.1)
+        nothing = np.full(720, np.inf)
+        bearings = np.linspace(-math.pi, math.pi, 720, endpoint=False)
+        chart.add(LidarScan(0.0, np.zeros(3), bearings, nothing, far), nothing < 0.0)
+        assert chart.unseen.mean() < 0.1 and not chart.static_map().polygons
+
     def test_what_is_behind_something_is_unseen(self):
         chart = ScanMap(HALL, 0.1)
         scan = Lidar().scan(hall(walls=[wall(1.0, -3.0, 1.2, 3.0)]))

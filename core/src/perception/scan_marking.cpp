@@ -87,8 +87,9 @@ CellWindow window_of(const LogOdds& map, const Vec2& from, std::span<const doubl
     low = {std::min(low.x, end.x), std::min(low.y, end.y)};
     high = {std::max(high.x, end.x), std::max(high.y, end.y)};
   }
-  const auto cell = [&](double place, double corner, Index beyond, Index count) {
-    return std::clamp<Index>(floor_index((place - corner) / map.side) + beyond, 0, count);
+  const auto cell = [&](double place, double corner, double beyond, Index count) {
+    const double at = (place - corner) / map.side + beyond;
+    return floor_index(std::clamp(at, 0.0, static_cast<double>(count)));
   };
   const Index rows = map.values.extent(0);
   const Index columns = map.values.extent(1);
@@ -99,8 +100,8 @@ CellWindow window_of(const LogOdds& map, const Vec2& from, std::span<const doubl
 }  // namespace
 
 CellWindow mark_scan(const LogOdds& map, const Vec2& from, std::span<const double> bearings,
-               std::span<const double> passed, std::span<const double> hits,
-               const ScanEvidence& evidence) {
+                     std::span<const double> passed, std::span<const double> hits,
+                     const ScanEvidence& evidence) {
   const CellWindow window = window_of(map, from, bearings, passed, hits);
   Marks marks(map, window);
   const double x = (from.x - map.corner.x) / map.side;
