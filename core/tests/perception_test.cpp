@@ -73,7 +73,7 @@ void scans_clear_and_fill_cells() {
       const LogOdds map{{values.data(), {3, 10}}, {0.0, 0.0}, 1.0};
       const std::array<double, 1> bearings{bearing};
       const std::array<double, 1> passed{3.2};
-      mark_scan(map, {x, 1.5}, bearings, passed, passed, {1.5, -0.4, -2.0, 4.5});
+      mark_scan(map, {x, 1.5}, bearings, passed, passed, {1.5, -0.4, -2.0, 4.5, false});
       const double sign = bearing == 0.0 ? 1.0 : -1.0;
       const auto end = static_cast<Index>(std::floor(x + 3.2 * sign));
       CHECK(map.values(1, end) == 1.5);
@@ -89,6 +89,20 @@ void scans_clear_and_fill_cells() {
   }
 }
 
+/// With noise a cell gets the mean of its beams; where beams end far off the map, nothing is hit.
+void noisy_cells_get_the_mean() {
+  std::vector<double> values(10 * 3, 0.0);
+  const LogOdds map{{values.data(), {3, 10}}, {0.0, 0.0}, 1.0};
+  const std::array<double, 4> bearings{0.0, 0.0, 0.0, std::numbers::pi};
+  const std::array<double, 4> passed{3.2, 1e300, 3.2, 0.0};
+  const std::array<double, 4> hits{3.2, 1e300, 3.2, 1e300};
+  const ScanEvidence evidence{1.5, -0.4, -2.0, 4.5, true};
+  const CellWindow window = mark_scan(map, {4.5, 1.5}, bearings, passed, hits, evidence);
+  CHECK(near_to(map.values(1, 7), (2.0 * 1.5 - 3.0 * 0.4) / 5.0, 1e-12));
+  CHECK(near_to(map.values(1, 9), -0.4, 1e-12) && map.values(1, 3) == 0.0);
+  CHECK(window.row <= 1 && window.end_row >= 2 && window.column <= 4 && window.end_column == 10);
+}
+
 }  // namespace
 }  // namespace pushplan
 
@@ -96,5 +110,6 @@ int main() {
   pushplan::rays_end_on_outlines();
   pushplan::rays_are_as_short_as_their_crossings();
   pushplan::scans_clear_and_fill_cells();
+  pushplan::noisy_cells_get_the_mean();
   return pushplan::tests::finish();
 }

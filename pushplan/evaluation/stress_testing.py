@@ -144,8 +144,9 @@ def stress(
 ) -> ScoreSheet:
     """Drive a policy by `pushplan.runtime.Runner` under one disturbance after another.
 
-    What is known of a robot that has been measured, its noise and the lag of its actuators, is
-    told to the runner. A planning call takes the same simulated time each, so the sheet repeats.
+    What is known of a robot that has been measured, its noise, also that of its sensors, and the
+    lag of its actuators, is told to the runner. A planning call takes the same simulated time
+    each, so the sheet repeats.
 
     Args:
         policy: a name, ``"module:Class"``, ``"file.py:Class"``, or a callable that makes one.
@@ -181,7 +182,9 @@ def stress(
         changes = {**condition.variations, "control_step": period}
         for scenario in scenarios:
             variations = {**scenario.variations, **changes}
-            noise = variations.get("object_noise", 0.0), variations.get("turn_noise", 0.0)
+            noise = (0.0, 0.0)
+            if variations.get("sensing", "full") != "full":
+                noise = variations.get("object_noise", 0.0), variations.get("turn_noise", 0.0)
             make = partial(_disturbed, spec, condition.disturbances, period, planning_time, noise)
             varied = replace(scenario, variations=Variations(variations))
             jobs.append(Job(PolicySpec(label, make), varied))

@@ -8,6 +8,7 @@ import importlib
 import importlib.util
 import os
 import sys
+import threading
 from collections.abc import Iterator, Mapping, Set
 from pathlib import Path
 from types import ModuleType
@@ -27,6 +28,7 @@ _imported: dict[str, tuple[str, tuple[int, int]]] = {}
 """Modules of users that `load_object` has brought along: their files, and versions of these."""
 _folders: list[str] = []
 """Folders of files that were loaded, the latest first: the end of the import path."""
+_loading = threading.RLock()  # one thread runs a file, the others wait for what it makes
 _DEEPEST = 32  # parts of a module's name: Python imports each within the one before it
 
 
@@ -193,16 +195,17 @@ def _load_file(path: Path) -> ModuleType:
     # files in two folders may share a name, and an edited one is another module
     digest = hashlib.sha256(str(path).encode() + b"\0" + source).hexdigest()[:8]
     name = f"pushplan_user_{path.stem}_{digest}"
-    if name in sys.modules:
-        return sys.modules[name]
-    spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # before it runs: its dataclasses look their module up there
-    try:
-        # what was hashed, even if the file has changed since
-        exec(compile(source, path, "exec"), module.__dict__)
-    except BaseException:
-        del sys.modules[name]  # else the next call would get what is half made
-        raise
-    return module
+    with _loading:
+        if name in sys.modules:
+            return sys.modules[name]
+        spec = importlib.util.spec_from_file_location(name, path)
+        assert spec is not None and spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        sys.modules[name] = module  # before it runs: its dataclasses look their module up there
+        try:
+            # what was hashed, even if the file has changed since
+            exec(compile(source, path, "exec"), module.__dict__)
+        except BaseException:
+            del sys.modules[name]  # else the next call would get what is half made
+            raise
+        return module

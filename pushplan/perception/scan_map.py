@@ -29,15 +29,15 @@ class ScanMap:
     """Occupancy grid (Moravec and Elfes 1985) whose occupied cells become a `StaticMap`.
 
     A beam is taken to end half a cell and half the noise behind what it has hit, so that surfaces
-    are hardly ever drawn too far and rarely much too near. Where noise spreads what is hit over
-    several cells, a cell gets the mean of what a scan's beams say of it, so that single readings
-    count little.
+    are as often drawn too near as too far. Where noise spreads what is hit over several cells, a
+    cell gets the mean of what a scan's beams say of it, so that single readings count little.
 
     Args:
         bounds: (4,) x_min, y_min, x_max, y_max of the scene [m].
         cell: side of a cell [m].
         rim: how far the map goes on beyond the bounds, where walls may stand [m].
-        noise: standard deviation of the distances that are measured [m].
+        noise: standard deviation of the distances that are measured [m]; should be no more than a
+            cell, since surfaces are drawn too far by what it is more.
 
     Attributes:
         origin: (2,) x, y [m] of the outer corner of cell (0, 0).
@@ -166,8 +166,8 @@ class ScanMap:
         wide = shapely.buffer(shape, _ROOM * self.cell)
         sides: FloatArray = (shapely.bounds(wide) - np.tile(self.origin, 2)) / self.cell
         c0, r0, c1, r1 = sides.tolist()
-        rows = slice(max(int(r0), 0), min(int(r1) + 1, flags.shape[0]))
-        columns = slice(max(int(c0), 0), min(int(c1) + 1, flags.shape[1]))
+        rows = slice(*np.clip([int(r0), int(r1) + 1], 0, flags.shape[0]).tolist())
+        columns = slice(*np.clip([int(c0), int(c1) + 1], 0, flags.shape[1]).tolist())
         y, x = np.mgrid[rows, columns]
         left, low = self.origin.tolist()
         cells = left + self.cell * (x + 0.5), low + self.cell * (y + 0.5)

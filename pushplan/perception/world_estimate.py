@@ -40,7 +40,7 @@ class WorldEstimate:
         bounds: (4,) x_min, y_min, x_max, y_max of the scene [m].
         known: what is known to be static; then scans say nothing new of what is static.
         cell: side of the cells of the map [m]; if None an eighth of the robot's inscribed radius,
-            and more where scans are less exact or that were more than 4 million cells.
+            and more where that were more than 4 million cells; never less than ``range_noise``.
         position_noise: standard deviation of the positions of detected objects [m].
         range_noise: standard deviation of the distances in scans [m].
         unknown: ``"free"`` or ``"obstacle"``, what counts where nobody has looked.
@@ -93,8 +93,9 @@ class WorldEstimate:
         self._near = 2.0 * math.hypot(place, range_noise)
         if cell is None:
             x0, y0, x1, y1 = checked_bounds("bounds", bounds).tolist()
-            cell = max(robot.inscribed_radius / _CELLS, range_noise)
+            cell = robot.inscribed_radius / _CELLS
             cell = max(cell, math.sqrt((x1 - x0) * (y1 - y0) / _MOST_CELLS))
+        cell = max(number("cell", cell, low=0.0, open_low=True), range_noise)
         self.map = ScanMap(bounds, cell, robot.circumscribed_radius, range_noise)
         if margin is None:
             margin = _INEXACT * self.map.cell * (known is None)

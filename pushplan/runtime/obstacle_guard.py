@@ -14,7 +14,7 @@ from pushplan.core import motion as core
 from pushplan.motion.collision import footprint, obstacles
 from pushplan.runtime.noise_allowance import NoiseAllowance
 from pushplan.world import Plan, StaticMap, Twist, World
-from pushplan.world.checks import FloatArray, frozen
+from pushplan.world.checks import FloatArray
 from pushplan.world.outline import flatten, outline_boxes
 
 _CLEARANCE = 0.02  # kept from what is new, beside the noise [circumscribed radii]
@@ -26,7 +26,6 @@ _HELD = 2.0  # for how long each command may be driven before the next one comes
 _TURNING_STEPS = 25  # in which a turn begins at most
 _FINE = 0.25  # distance between poses of circles, in that of other paths
 _MOVED = 4.0  # distance from its place at which something fixed may be seen [clearances]
-_BESIDE = 0.5  # distance from its plan up to which a robot follows it [circumscribed radii]
 _ANYWHERE = StaticMap.build(bounds=(-1e9, -1e9, 1e9, 1e9))
 
 
@@ -34,9 +33,9 @@ class ObstacleGuard:
     """Looks at each command: the robot has to be able to stop before what is new.
 
     New is what is static, or held not to move, and was not so in each world since the start. All
-    else is left to the policy, which knows it: a guard of it would hinder pushes along walls. So
-    is what is new while the plan that is followed keeps clear of it. A robot that is too near
-    already may drive wherever it comes no nearer.
+    else is left to the policy, which knows it: a guard of it would hinder pushes along walls. A
+    robot that is too near already may drive wherever it comes no nearer. One that cannot stop has
+    to be able to drive a circle, or what its plan does next, from where it is.
 
     Args:
         allowance: noise of the poses.
@@ -90,18 +89,16 @@ class ObstacleGuard:
             before: the velocity that is driven then.
             wanted: what the policy asks for.
             held: time since the last command [s].
-            plan: that the policy follows, if any.
+            plan: of the policy, if it shows one.
         """
         robot = world.robot
         twist = ramp_twist(robot, before, wanted.linear, wanted.angular, held, wanted.lateral)
-        near = self._near(world, twist)
-        grown = self._clearance(world) * (_RESUMED if self._stands else 1.0)
-        if near and plan is not None:
-            near = self._unheeded(world, plan, near, grown)
+        near = self._near(world, self._paths(world, twist, plan))
         if not near:
             self._stands = False
             self._side = 0
             return twist, ""
+        grown = self._clearance(world) * (_RESUMED if self._stands else 1.0)
         closeness = _Closeness(footprint(robot, grown), world.robot_pose, near)
         for fraction in _SLOWER if robot.can_stop else (1.0,):
             slower = ramp_twist(
@@ -112,7 +109,7 @@ class ObstacleGuard:
                 held,
                 fraction * wanted.lateral,
             )
-            for side, path in self._paths(world, slower):
+            for side, path in self._paths(world, slower, plan):
                 if closeness.allows(path):
                     self._stands = False
                     self._side = side
@@ -125,13 +122,45 @@ class ObstacleGuard:
         reason = _reason(world, near, "stops" if robot.can_stop else "turns away")
         return ramp_twist(robot, before, rest.linear, turn, held), reason
 
-    def _paths(self, world: World, twist: Twist) -> list[tuple[int, FloatArray]]:
-        """Return the paths of a command: (N, 3) to a stand, or around the circle of either side."""
+    def _paths(self, world: World, twist: Twist, plan: Plan | None) -> list[tuple[int, FloatArray]]:
+        """Return the paths (N, 3) of a command, each with the side on which it turns.
+
+        One to a stand, or, where the robot cannot stop, around the circle of either side, and one
+        that goes on as the plan does, if that is long enough.
+        """
         robot = world.robot
         held = _HELD * self._period
         if robot.can_stop:
             return [(0, stopping_path(robot, world.robot_pose, twist, held, self._period))]
-        return [(side, self._circle(world, twist, side)) for side in (1, -1)]
+        paths = [(side, self._circle(world, twist, side)) for side in (1, -1)]
+        if plan is not None:
+            planned = self._planned(world, twist, plan)
+            if planned is not None:
+                paths.append((0, planned))
+        return paths
+
+    def _planned(self, world: World, twist: Twist, plan: Plan) -> FloatArray | None:
+        """(N, 3) poses of a command, and of what the plan does next.
+
+        None if it ends before the length of a circle, and not at the goal.
+        """
+        fine = _FINE * world.robot.circumscribed_radius
+        poses = [np.array(world.robot_pose)]
+        held = _HELD * self._period
+        add_arc(poses, twist.linear * held, twist.angular * held, fine)
+        offsets = plan.poses[:, :2] - poses[-1][:2]
+        left = math.tau * world.robot.turning_radius
+        for k in range(int(np.hypot(*offsets.T).argmin()), len(plan.times) - 1):
+            span = float(plan.times[k + 1] - plan.times[k])
+            step = float(plan.speeds[k]) * span
+            add_arc(poses, step, float(plan.turn_rates[k]) * span, fine)
+            left -= abs(step)
+            if left <= 0.0:
+                break
+        else:
+            if not world.moved(robot_pose=plan.poses[-1]).goal_reached:
+                return None
+        return np.array(poses)
 
     def _circle(self, world: World, twist: Twist, side: int) -> FloatArray:
         """(N, 3) poses of a command, and of the tightest circle to the left (1) or right (-1)."""
@@ -148,39 +177,19 @@ class ObstacleGuard:
         add_arc(poses, robot.turning_radius * math.tau, side * math.tau, fine)
         return np.array(poses)
 
-    def _unheeded(
-        self, world: World, plan: Plan, near: list[FloatArray], grown: float
-    ) -> list[FloatArray]:
-        """Those outlines from which a plan does not keep away, or all if the robot has left it."""
-        offsets = plan.poses[:, :2] - world.robot_pose[:2]
-        away = np.hypot(*offsets.T)
-        reach = world.robot.circumscribed_radius
-        if away.min() > _BESIDE * reach:
-            return near
-        boxes = outline_boxes(*flatten(near)) - np.tile(world.robot_pose[:2], 2)
-        far = np.hypot(*np.maximum(-boxes[:, :2], boxes[:, 2:]).T).max() + 2.0 * reach
-        poses = frozen(plan.poses[away <= far])
-        shape = footprint(world.robot, grown)
-        return [
-            part
-            for part in near
-            if core.CollisionChecker(shape, obstacles(_ANYWHERE, (part,))).first_blocked(poses)
-            < len(poses)
-        ]
-
-    def _near(self, world: World, twist: Twist) -> list[FloatArray]:
-        """Outlines of what is new and within reach."""
+    def _near(self, world: World, paths: list[tuple[int, FloatArray]]) -> list[FloatArray]:
+        """Outlines of what is new and within reach of some paths (N, 3)."""
         if not self._new and not self._new_fixed:
             return []
         objects = world.movables
         chosen = np.flatnonzero(np.isin(objects.ids, list(self._new_fixed))).tolist()
         held = [part for k in chosen for part in objects.parts_world(k)]
-        path = np.concatenate([path for _, path in self._paths(world, twist)])
+        outlines = [*self._new, *held]
+        boxes = outline_boxes(*flatten(outlines))
+        path = np.concatenate([path for _, path in paths])
         reach = world.robot.circumscribed_radius + 2.0 * _RESUMED * self._clearance(world)
         low = path[:, :2].min(axis=0) - reach
         high = path[:, :2].max(axis=0) + reach
-        outlines = [*self._new, *held]
-        boxes = outline_boxes(*flatten(outlines))
         near = ((boxes[:, 2:] >= low) & (boxes[:, :2] <= high)).all(axis=1)
         return [part for part, is_near in zip(outlines, near, strict=True) if is_near]
 

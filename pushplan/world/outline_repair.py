@@ -32,6 +32,7 @@ _FILLED = 0.004  # and for filling dents, so that fewer parts are enough
 _FEW_CORNERS = 12  # outlines with no more than these keep all of them
 _TOLERANCES = (0.02, 0.01, 0.005, 0.002, 0.001)
 """Distances from the outline [sizes of it] within which corners may be left out, tried in turn."""
+_ROUNDING = 1e-12
 _SLIVER = 1e-6
 """Pieces and parts below this fraction of the area are left out."""
 
@@ -163,9 +164,10 @@ def disjoint_pieces(parts: ConvexParts) -> ConvexParts:
     union = shapely.union_all([shapely.Polygon(part) for part in parts])
     triangles = np.array(_triangles(_areal(union)))
     along, across = np.moveaxis(triangles[:, 1:] - triangles[:, :1], 1, 0)
-    clockwise = along[:, 0] * across[:, 1] < along[:, 1] * across[:, 0]
-    triangles[clockwise] = triangles[clockwise, ::-1]
-    return tuple(frozen(triangles))
+    doubled = along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]
+    triangles[doubled < 0.0] = triangles[doubled < 0.0, ::-1]
+    least = _ROUNDING * np.abs(doubled).max()  # two corners may be one but for rounding
+    return tuple(frozen(triangles[np.abs(doubled) > least]))
 
 
 def union_rings(parts: ConvexParts) -> tuple[FloatArray, ...]:

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import functools
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -35,6 +36,14 @@ def test_labels() -> None:
     with pytest.raises(InvalidInputError, match="two policies are labelled 'straight'"):
         parse_policies("straight,straight")
     assert [spec.label for spec in parse_policies("straight, b=straight")] == ["straight", "b"]
+
+
+def test_a_thread_waits_for_the_file_that_another_one_loads(tmp_path: Path) -> None:
+    path = tmp_path / "slow.py"
+    path.write_text(f"import time\ntime.sleep(0.2)\n{PLANNER}")
+    with ThreadPoolExecutor(4) as pool:
+        made = list(pool.map(lambda _: parse_policy(f"{path}:Lazy").make(), range(4)))
+    assert len({type(policy.planner) for policy in made}) == 1
 
 
 def test_a_planner_is_wrapped(tmp_path: Path) -> None:

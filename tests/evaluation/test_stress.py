@@ -68,7 +68,7 @@ def test_by_default_all_conditions_on_any_task():
 @pytest.mark.slow
 def test_conditions_of_sensors_change_what_a_robot_with_sensors_sees():
     wanted = ["sensor-noise", "sensor-drop-out-30", "sensor-delay-200ms"]
-    given = {"conditions": wanted, "episodes": 1, "seed": 2, "workers": 0}
+    given = {"conditions": wanted, "episodes": 1, "seed": 4, "workers": 0}
     sheet = stress("kinodynamic-rrt", "maze-3d-6-lidar", **given)
     assert [row.condition for row in sheet.rows] == [UNDISTURBED, *wanted]
     lengths = {row.condition: row.scores["E_nav"] for row in sheet.rows}
@@ -92,7 +92,8 @@ def test_a_policy_is_told_the_noise_of_sensors():
 
     given = {"conditions": ["sensor-noise"], "episodes": 1, "workers": 0}
     stress(Ahead, "maze-3d-6-lidar", **given)
-    assert told[0] == (0.0, 0.0) and any(0.0 < place < 0.02 for place, _ in told)
+    assert told[0] == (0.0, 0.0)
+    assert any(0.0 < place < 0.02 and 0.0 < heading < 0.06 for place, heading in told)
 
 
 def test_under_unknown_parameters_a_policy_is_told_the_nominal_ones():

@@ -23,6 +23,7 @@ from pushplan.world import (
     GoalDisc,
     GoalLine,
     Movables,
+    Plan,
     RobotModel,
     StaticMap,
     Twist,
@@ -102,12 +103,19 @@ class DrivenRobot:
     """
 
     def __init__(
-        self, policy: object, world: World, *, delay: float = 0.0, noise: float = 0.0, seed: int = 0
+        self,
+        policy: object,
+        world: World,
+        *,
+        delay: float = 0.0,
+        noise: float = 0.0,
+        seed: int = 0,
+        latency: float = 0.1,
     ) -> None:
         self.runner = Runner(
             policy,
             period=PERIOD,
-            executor=DelayedExecutor(0.1),
+            executor=DelayedExecutor(latency),
             delay=delay,
             position_noise=noise,
             heading_noise=noise,
@@ -312,6 +320,51 @@ def test_what_comes_beside_the_plan_is_left_to_the_policy() -> None:
     assert all(driven.overlap(one) == 0.0 for one in walls)
     blocked = [one for one in driven.commands if one.status is CommandStatus.BLOCKED]
     assert len(blocked) < 5
+
+
+class ShowsPlan(Ahead):
+    """Drives ahead, and shows a plan of few poses, which may end sooner."""
+
+    speed = 0.8
+
+    def __init__(self, *places: float) -> None:
+        poses = np.array([[x, 3.0, 0.0] for x in places])
+        times = (poses[:, 0] - poses[0, 0]) / self.speed
+        fast, still = np.full(len(places), self.speed), np.zeros(len(places))
+        self.current_plan = Plan(times, poses, fast, still, travel_cost=1.0)
+
+
+@pytest.mark.parametrize("drive", [Drive.DIFFERENTIAL, Drive.CONSTANT_SPEED])
+@pytest.mark.parametrize("places", [(1.5, 4.0, 8.0), (1.5, 2.0, 2.5, 3.0, 3.5, 4.1)])
+@pytest.mark.parametrize("at", [4.2, 4.6, 5.0])
+def test_a_plan_that_is_shown_leads_no_robot_into_a_new_wall(drive, places, at) -> None:
+    robot = replace(ROBOT, drive=drive, max_turn_rate=3.0)
+    driven = DrivenRobot(ShowsPlan(*places), room(robot))
+    post = np.array([[at, 2.6], [at + 0.05, 2.6], [at + 0.05, 3.4], [at, 3.4]])
+    driven.drive(200, when_at(3.0, lambda world: adding(world, post)))
+    assert driven.overlap(post) == 0.0
+
+
+@pytest.mark.parametrize("turn", [-1.0, -0.5, 0.5, 1.0])
+def test_a_robot_that_is_turned_away_from_its_plan_touches_no_new_wall(turn: float) -> None:
+    block = np.array([[4.0, 3.3], [7.0, 3.3], [7.0, 4.0], [4.0, 4.0]])
+    driven = DrivenRobot("straight", room())
+    driven.drive(42, when_at(1.8, lambda world: adding(world, block)))
+    kicked = driven.world.robot_pose + np.array([0.0, 0.0, turn])
+    driven.world, driven.poses = driven.world.moved(robot_pose=kicked), [kicked]
+    driven.drive(300)
+    assert driven.overlap(block) == 0.0
+
+
+@pytest.mark.parametrize("latency", [0.1, 1.0])
+def test_a_robot_beside_its_plan_needs_few_plans(latency: float) -> None:
+    driven = DrivenRobot("straight", room(), latency=latency)
+    driven.drive(60)
+    pushed = driven.world.robot_pose + np.array([0.0, -0.2, 0.0])
+    driven.world = driven.world.moved(robot_pose=pushed)
+    driven.poses = [pushed]
+    assert driven.drive(400).status is CommandStatus.DONE
+    assert len(driven.runner.policy.plan_log) <= 4
 
 
 def test_a_map_that_is_perceived_anew_each_time_costs_no_plan(monkeypatch) -> None:

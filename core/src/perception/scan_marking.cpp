@@ -76,6 +76,11 @@ struct Walk {
   bool is_in(Index low, Index high) const { return low <= at && at < high; }
 };
 
+/// A place in cells, beyond a map of so many no farther than two.
+double limited(double at, Index count) {
+  return std::clamp(at, -2.0, static_cast<double>(count) + 2.0);
+}
+
 /// The cells of a map up to one beyond the ends of all beams.
 CellWindow window_of(const LogOdds& map, const Vec2& from, std::span<const double> bearings,
                      std::span<const double> passed, std::span<const double> hits) {
@@ -87,9 +92,9 @@ CellWindow window_of(const LogOdds& map, const Vec2& from, std::span<const doubl
     low = {std::min(low.x, end.x), std::min(low.y, end.y)};
     high = {std::max(high.x, end.x), std::max(high.y, end.y)};
   }
-  const auto cell = [&](double place, double corner, double beyond, Index count) {
-    const double at = (place - corner) / map.side + beyond;
-    return floor_index(std::clamp(at, 0.0, static_cast<double>(count)));
+  const auto cell = [&](double place, double corner, Index beyond, Index count) {
+    const Index at = floor_index(limited((place - corner) / map.side, count));
+    return std::clamp<Index>(at + beyond, 0, count);
   };
   const Index rows = map.values.extent(0);
   const Index columns = map.values.extent(1);
@@ -104,8 +109,8 @@ CellWindow mark_scan(const LogOdds& map, const Vec2& from, std::span<const doubl
                      const ScanEvidence& evidence) {
   const CellWindow window = window_of(map, from, bearings, passed, hits);
   Marks marks(map, window);
-  const double x = (from.x - map.corner.x) / map.side;
-  const double y = (from.y - map.corner.y) / map.side;
+  const double x = limited((from.x - map.corner.x) / map.side, map.values.extent(1));
+  const double y = limited((from.y - map.corner.y) / map.side, map.values.extent(0));
   for (std::size_t beam = 0; beam < bearings.size(); ++beam) {
     const Vec2 along{std::cos(bearings[beam]), std::sin(bearings[beam])};
     const double end = passed[beam] / map.side;
@@ -119,8 +124,8 @@ CellWindow mark_scan(const LogOdds& map, const Vec2& from, std::span<const doubl
     }
     if (!std::isfinite(hits[beam])) continue;
     const double away = hits[beam] / map.side;
-    const Index hit_row = floor_index(y + away * along.y);
-    const Index hit_column = floor_index(x + away * along.x);
+    const Index hit_row = floor_index(limited(y + away * along.y, map.values.extent(0)));
+    const Index hit_column = floor_index(limited(x + away * along.x, map.values.extent(1)));
     for (Index i = std::max(hit_row - 1, window.row); i < std::min(hit_row + 2, window.end_row); ++i) {
       for (Index j = std::max(hit_column - 1, window.column);
            j < std::min(hit_column + 2, window.end_column); ++j) {

@@ -14,8 +14,7 @@ from pushplan.interaction import InteractionModel
 from pushplan.planners.following.replanning import poses_at
 from pushplan.world import Plan, World
 from pushplan.world.checks import FloatArray
-from pushplan.world.outline import transform
-from pushplan.world.polyline import path_length
+from pushplan.world.polyline import arc_lengths, path_length
 
 _SPACING = 0.15  # distance between the poses of a stretch without a plan [R]
 
@@ -39,7 +38,7 @@ def world_ahead(
         now: how far on it the robot is, by its times [s].
         latency: how far to look ahead [s].
         interaction: predicts the objects.
-        off_plan: the robot has left the plan, and does from where it is what the plan does.
+        off_plan: the robot has left the plan, and comes back to it within some of its radii.
 
     Returns:
         The predicted world, and the plan of the stretch; ``world`` itself and None where there is
@@ -118,10 +117,10 @@ def _stretch(
     else:
         times, poses, twists = _on_plan(plan, now, latency)
         if off_plan:
-            turned = world.robot_pose - poses[0]
-            offsets = poses[:, :2] - poses[0, :2]
-            places = transform(np.append(world.robot_pose[:2], turned[2]), offsets)
-            poses = np.column_stack([places, poses[:, 2] + turned[2]])
+            off = world.robot_pose - poses[0]
+            off[2] = math.remainder(off[2], math.tau)
+            size = world.robot.circumscribed_radius
+            poses = poses + off * np.exp(-arc_lengths(poses) / size)[:, None]
     left = latency - float(times[-1])
     if left <= 1e-9:
         return times, poses, twists

@@ -263,12 +263,14 @@ class TestStitching:
         assert stretch.times[-1] == pytest.approx(10.0)
         assert stretch.poses[-1] == pytest.approx([1.5, 0, 0])
 
-    def test_a_robot_that_has_left_the_plan_does_the_same_from_where_it_is(self):
+    def test_a_robot_that_has_left_the_plan_comes_back_to_it(self):
         plan = line_plan(floor())
-        world = floor(robot_pose=[0.3, 1.0, math.pi / 2.0])
-        ahead, stretch = world_ahead(world, plan, 2.0, 10.0, MODEL, off_plan=True)
-        assert stretch.poses[0] == pytest.approx([0.3, 1.0, math.pi / 2.0])
-        assert ahead.robot_pose == pytest.approx([0.3, 2.5, math.pi / 2.0])
+        world = floor(robot_pose=[0.3, 1.0, 0.5 + math.tau])
+        soon, stretch = world_ahead(world, plan, 2.0, 0.1, MODEL, off_plan=True)
+        assert stretch.poses[0] == pytest.approx([0.3, 1.0, 0.5])
+        assert soon.robot_pose == pytest.approx([0.315, 1.0, 0.5], abs=0.03)
+        later, _ = world_ahead(world, plan, 2.0, 30.0, MODEL, off_plan=True)
+        assert later.robot_pose == pytest.approx([4.8, 0.0, 0.0], abs=0.01)
 
     def test_no_latency_is_no_stretch(self):
         world = floor()
