@@ -32,7 +32,7 @@ _FILLED = 0.004  # and for filling dents, so that fewer parts are enough
 _FEW_CORNERS = 12  # outlines with no more than these keep all of them
 _TOLERANCES = (0.02, 0.01, 0.005, 0.002, 0.001)
 """Distances from the outline [sizes of it] within which corners may be left out, tried in turn."""
-_ROUNDING = 1e-12
+_ROUNDING = 1e-12  # a triangle that is a smaller part of the largest has no area
 _SLIVER = 1e-6
 """Pieces and parts below this fraction of the area are left out."""
 
