@@ -93,7 +93,7 @@ class ObstacleGuard:
         """
         robot = world.robot
         twist = ramp_twist(robot, before, wanted.linear, wanted.angular, held, wanted.lateral)
-        near = self._near(world, self._paths(world, twist, plan))
+        near = self._near(world, twist, plan)
         if not near:
             self._stands = False
             self._side = 0
@@ -177,8 +177,8 @@ class ObstacleGuard:
         add_arc(poses, robot.turning_radius * math.tau, side * math.tau, fine)
         return np.array(poses)
 
-    def _near(self, world: World, paths: list[tuple[int, FloatArray]]) -> list[FloatArray]:
-        """Outlines of what is new and within reach of some paths (N, 3)."""
+    def _near(self, world: World, twist: Twist, plan: Plan | None) -> list[FloatArray]:
+        """Outlines of what is new and within reach."""
         if not self._new and not self._new_fixed:
             return []
         objects = world.movables
@@ -186,7 +186,7 @@ class ObstacleGuard:
         held = [part for k in chosen for part in objects.parts_world(k)]
         outlines = [*self._new, *held]
         boxes = outline_boxes(*flatten(outlines))
-        path = np.concatenate([path for _, path in paths])
+        path = np.concatenate([path for _, path in self._paths(world, twist, plan)])
         reach = world.robot.circumscribed_radius + 2.0 * _RESUMED * self._clearance(world)
         low = path[:, :2].min(axis=0) - reach
         high = path[:, :2].max(axis=0) + reach
