@@ -145,12 +145,15 @@ class DrivenRobot:
         return self.commands[-1]
 
     def step(self, twist: Twist) -> None:
+        speed = math.hypot(twist.linear, twist.lateral)
+        bearing = np.array([0.0, 0.0, math.atan2(twist.lateral, twist.linear)])
         for _ in range(5):
             pose = np.empty(3)
             part = PERIOD / 5
-            arc_step(self.poses[-1], twist.linear * part, twist.angular * part, pose)
-            self.poses.append(pose)
-        vx, vy = twist.linear * math.cos(pose[2]), twist.linear * math.sin(pose[2])
+            arc_step(self.poses[-1] + bearing, speed * part, twist.angular * part, pose)
+            self.poses.append(pose - bearing)
+        vx, vy = speed * math.cos(pose[2]), speed * math.sin(pose[2])
+        pose = self.poses[-1]
         self.world = self.world.moved(
             robot_pose=pose, robot_twist=[vx, vy, twist.angular], time=self.world.time + PERIOD
         )
