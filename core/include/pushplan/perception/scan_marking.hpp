@@ -31,8 +31,8 @@ struct CellWindow {
   Index end_column;
 };
 
-/// Marks beams from a point; a scan changes a cell once. A beam is free up to `passed` [m], where it
-/// has one; it ends in a cell at `hits` [m], unless that is infinite. Bearings are those of the world.
+/// Marks beams from a point; a scan changes a cell once. A beam is free up to `passed` [m]; it ends
+/// in a cell at `hits` [m], unless that is infinite. Bearings are those of the world.
 /// Returns the cells that may have changed.
 CellWindow mark_scan(const LogOdds& map, const Vec2& from, std::span<const double> bearings,
                      std::span<const double> passed, std::span<const double> hits,
