@@ -156,6 +156,21 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         """Builder of the observations."""
         return self._builder
 
+    def observed(self, builder: ObservationBuilder) -> NDArray[Any]:
+        """The scene now as a builder observes it: what is known of it, or the last scan.
+
+        Raises:
+            EpisodeOverError: before the first `reset`.
+        """
+        sensor: Any = builder
+        if not getattr(sensor, "is_sensor", False):
+            return builder.observe(self.world)
+        world = self.true_world
+        if self._sensing is None:
+            return builder.observe(world)
+        scan: NDArray[Any] = sensor.observe_scan(self._sensing.scan, self.world)
+        return scan
+
     @property
     def world(self) -> World:
         """A snapshot of the scene now, as far as a policy is told (`Task.told`) and has seen.
@@ -231,12 +246,13 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         if self.task.variations.sensing != "full":
             told = self.task.told(world)
             sensing = need("pushplan.envs.sensing").SimulatedSensing
-            self._sensing = sensing(self.task.variations, told, stream(layout, "sensing"))
+            beams = getattr(self._builder, "beams", 0)
+            self._sensing = sensing(self.task.variations, told, stream(layout, "sensing"), beams)
             self._sensing.look(told)
         info = _info(StepOutcome(0.0, False, "", False, False), 0.0, False)
         if world.goal_kind == "objects":
             info["completed"] = np.zeros(len(world.movables), dtype=bool)
-        return self._observe(world), info
+        return self._observe(), info
 
     def step(self, action: ArrayLike) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
         """Carry out one action.
@@ -327,7 +343,7 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
             self._over = f"the episode has ended ({outcome.reason})"
         self._renderer.show(after)
         return (
-            self._observe(after),
+            self._observe(),
             outcome.reward,
             outcome.terminated,
             outcome.truncated,
@@ -340,22 +356,15 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         Long where the robot touches nothing; otherwise the robot may be held, or an object leave.
         """
         period = self.task.control_step
-        if periods <= 1.0 or not self._simulator.is_exact:
+        if periods <= 1.0 or not self._simulator.is_exact or self._sensing is not None:
             return period * min(periods, 1.0)
         clear = self._simulator.clear_for(command, period * periods)
         most = 1.0 if self.task.objects_leave else min(periods, _LONGEST)
         return period * max(most, math.floor(clear / period + 1e-9))
 
-    def _observe(self, world: World) -> NDArray[Any]:
+    def _observe(self) -> NDArray[Any]:
         began = time.perf_counter()
-        builder: Any = self._builder
-        observation: NDArray[Any]
-        if not getattr(builder, "is_sensor", False):
-            observation = builder.observe(self.world)
-        elif self._sensing is None:
-            observation = builder.observe(world)
-        else:
-            observation = builder.observe_scan(self._sensing.scan, self.world)
+        observation = self.observed(self._builder)
         self.observation_time_s = time.perf_counter() - began
         return observation
 

@@ -14,6 +14,7 @@ from pushplan.observation.state import goal_point
 from pushplan.perception.lidar import Lidar, LidarScan, sensor_range
 from pushplan.world import RobotModel, World
 from pushplan.world.checked_fields import CheckedFields, Limits, PositiveFloat
+from pushplan.world.checks import expect
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,8 @@ class LidarObservation(LimitedVector, CheckedFields):
 
     def observe(self, world: World) -> NDArray[np.float32]:
         """The vector, of a scan without noise of the scene."""
-        return self.observe_scan(Lidar(beams=self.beams, range=self.range).scan(world), world)
+        lidar = Lidar(beams=max(self.beams, Lidar.beams), range=self.range)
+        return self.observe_scan(lidar.scan(world), world)
 
     def observe_scan(self, scan: LidarScan, world: World) -> NDArray[np.float32]:
         """The vector of a scan, of whatever bearings; the nearest distance of each direction.
@@ -54,6 +56,8 @@ class LidarObservation(LimitedVector, CheckedFields):
             scan: of the robot's lidar.
             world: where the robot is and has to go.
         """
+        expect("scan", scan, LidarScan)
+        expect("world", world, World)
         nearest = np.ones(self.beams)
         beam = np.rint(scan.bearings * (self.beams / math.tau)).astype(np.int64) % self.beams
         np.fmin.at(nearest, beam, scan.ranges / self.range)

@@ -474,6 +474,16 @@ class TestDataset:
             [1.0, 0.0, 0.0],
         ]
 
+    def test_scans_of_an_estimate_are_none(self, tmp_path):
+        from pushplan.planners import make_policy
+
+        observation = {"kind": "lidar", "beams": 72}
+        data = {**tiny("bc").to_dict(), "observation": observation}
+        config = TrainingConfig.from_dict({**data, "scenarios": [{"sensing": "lidar"}]})
+        with pytest.raises(InvalidInputError, match="without sensing"):
+            record(config, make_policy("straight"), "straight", tmp_path / "data", episodes=1)
+        assert not (tmp_path / "data").exists()
+
     def test_damage_is_said(self, data, tmp_path):
         with pytest.raises(InvalidInputError, match="not empty"):
             record(tiny("bc"), None, "x", data, episodes=1)

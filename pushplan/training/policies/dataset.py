@@ -123,6 +123,13 @@ def record(
     if isinstance(policy, ChoosesObservation):
         wanted = policy.observation
     envs = environments(config, wanted, action_modes(policy) or None)
+    if getattr(builder, "is_sensor", False):
+        for env in envs:
+            if (sensing := env.task.variations.sensing) != "full":
+                raise InvalidInputError(
+                    "a data set with observations of a lidar is made in scenarios without sensing: "
+                    f"the scans are made of the scene; got sensing {sensing!r}"
+                )
     (folder / "data").mkdir(parents=True, exist_ok=True)
     steps = successes = count = 0
     for index in range(episodes):

@@ -150,8 +150,8 @@ class TrainingEnv(gymnasium.Env[NDArray[Any], Any]):
         return self.observe(), self.config.reward_scale * total, terminated, truncated, told
 
     def observe(self) -> NDArray[Any]:
-        """Return the network's observation of the present world."""
-        return self._builder.observe(self._env.world)
+        """Return the network's observation of the present scene."""
+        return self._env.observed(self._builder)
 
     def close(self) -> None:
         """Close the environments."""
