@@ -23,16 +23,20 @@ class SimulatedSensing:
         variations: of the task: what is seen, how far, and with what noise.
         world: the scene at the start of an episode, which the first call of `look` looks at.
         rng: of all noise.
+        beams: least number of beams of the lidar.
 
     Attributes:
         world: what the robot knows now.
         scan: the last one that it got; None before the first.
     """
 
-    def __init__(self, variations: TaskVariations, world: World, rng: np.random.Generator) -> None:
+    def __init__(
+        self, variations: TaskVariations, world: World, rng: np.random.Generator, beams: int = 0
+    ) -> None:
         far = sensor_range(world.robot, variations.view_range)
         angle = variations.view_angle
         self._lidar = Lidar(
+            beams=max(beams, Lidar.beams),
             field_of_view=angle,
             range=far,
             noise=variations.range_noise,
@@ -58,6 +62,7 @@ class SimulatedSensing:
             known=known,
             unknown_price=variations.unknown_price,
             position_noise=variations.object_noise,
+            heading_noise=variations.turn_noise,
             range_noise=variations.range_noise,
             margin=world.margin or None,
         )
@@ -74,10 +79,9 @@ class SimulatedSensing:
             driven: what the robot was told to drive since the last look; nothing by default.
         """
         now = world.time
-        if now >= self._seen_at + max(self._interval, 1e-6) - 1e-9:
-            delay = self._delay
-            if self._seen_at == -math.inf:  # an episode begins when the first reading is there
-                delay = 0.0
+        is_first = self._seen_at == -math.inf
+        if is_first or now >= self._seen_at + max(self._interval, 1e-6) - 1e-9:
+            delay = 0.0 if is_first else self._delay  # an episode begins with a reading
             self._seen_at = now
             scan = self._lidar.scan(world, self._rng)
             detections = self._detector.detect(world, self._rng)

@@ -17,7 +17,7 @@ from pushplan.world.checked_fields import (
     NonNegativeFloat,
     PositiveFloat,
 )
-from pushplan.world.checks import FloatArray
+from pushplan.world.checks import FloatArray, expect
 
 _RAYS = 720  # in a full circle, by which the visible part of an outline is measured
 
@@ -77,6 +77,7 @@ class Detector(CheckedFields):
         objects = world.movables
         poses = np.array(objects.poses)
         if rng is not None:
+            expect("rng", rng, np.random.Generator)
             place = self.position_noise
             poses += np.array([place, place, self.heading_noise]) * rng.normal(size=poses.shape)
             seen &= rng.random(len(poses)) >= self.miss_rate
@@ -88,7 +89,7 @@ class Detector(CheckedFields):
 
         0 for one beyond the range or outside the field of view.
         """
-        objects = world.movables
+        objects = expect("world", world, World).movables
         pose = world.robot_pose
         away = np.hypot(*(objects.poses[:, :2] - pose[:2]).T)
         near = np.flatnonzero(away - objects.radii < self.range)

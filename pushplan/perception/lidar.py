@@ -21,7 +21,7 @@ from pushplan.world.checked_fields import (
     PositiveFloat,
     Shape,
 )
-from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, IntArray, frozen
+from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, IntArray, expect, frozen
 
 _DEFAULT_RANGE = 30.0  # of the sensors of a robot [circumscribed radii]
 Angle = Annotated[float, Limits(0.0, math.tau, open_low=True)]
@@ -55,7 +55,7 @@ class LidarScan(ArrayRecord, CheckedFields):
         super().__post_init__()
         try:
             ranges = np.array(self.ranges, dtype=np.float64)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             ranges = np.full(1, -1.0)
         if ranges.shape != self.bearings.shape or (ranges < 0.0).any():
             raise InvalidInputError(
@@ -108,10 +108,12 @@ class Lidar(CheckedFields):
             world: the scene.
             rng: of noise and drop-outs; without it there are none.
         """
+        expect("world", world, World)
         outlines = [world.static.packed, object_outlines(world.movables)]
         lengths = ray_lengths(world.robot_pose, self.beams, self.range, outlines)[self._kept]
         ranges = np.where(lengths < self.range, lengths, np.inf)
         if rng is not None:
+            expect("rng", rng, np.random.Generator)
             noisy = np.maximum(ranges + self.noise * rng.normal(size=len(ranges)), 0.0)
             ranges = np.where(rng.random(len(ranges)) < self.drop_out, np.nan, noisy)
         bearings = _turned(self.beams)[self._kept]

@@ -11,15 +11,25 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from pushplan.core import perception as core
+from pushplan.errors import short
 from pushplan.perception.lidar import LidarScan
 from pushplan.world import InvalidInputError, StaticMap
-from pushplan.world.checks import BoolArray, FloatArray, checked_bounds, frozen, number
-from pushplan.world.occupancy_grid import rectangle_cover
+from pushplan.world.checks import (
+    BoolArray,
+    FloatArray,
+    checked_bounds,
+    choice,
+    expect,
+    frozen,
+    number,
+)
+from pushplan.world.occupancy_grid import UNKNOWN, rectangle_cover
 
 _EVIDENCE = frozen(
     np.array([1.5, -0.4, -2.0, 4.5])
 )  # log-odds of a hit and of a miss, and their limits
 _ROOM = 2.0  # cells around bodies that are free where nobody has seen
+_DEEP = 1.5  # cells inside something else in which a cell of a wall cannot be
 _GONE = -1.0  # log-odds below which an occupied cell is free again
 _TILE = 16  # cells along the side of a part of the map whose rectangles are found anew together
 _MOST_CELLS = 25_000_000
@@ -65,6 +75,8 @@ class ScanMap:
         columns, rows = (math.ceil(side - 1e-9) for side in sides)
         self.log_odds = np.zeros((rows, columns))
         self._occupied = np.zeros((rows, columns), dtype=np.bool_)
+        self._since = np.zeros((rows, columns))
+        self._time = -math.inf
         self._solid = np.zeros((rows, columns), dtype=np.bool_)
         self._unseen: BoolArray = frozen(np.ones((rows, columns), dtype=np.bool_))
         self._changed = _Window(rows, columns)
@@ -78,12 +90,21 @@ class ScanMap:
         return self._unseen
 
     def add(self, scan: LidarScan, ignored: BoolArray) -> None:
-        """Mark a scan.
+        """Mark a scan; one from beyond the map says nothing.
 
         Args:
             scan: what the sensor saw.
             ignored: (N,) beams that have hit something that belongs to no map.
         """
+        self._time = max(self._time, expect("scan", scan, LidarScan).time)
+        ignored = np.asarray(ignored)
+        if ignored.shape != scan.ranges.shape or ignored.dtype != np.bool_:
+            raise InvalidInputError(
+                f"ignored must be {len(scan.ranges)} truths, one a beam, got {short(ignored)}"
+            )
+        row, column = ((scan.pose[1::-1] - self.origin[::-1]) / self.cell).tolist()
+        if not (0.0 <= row <= len(self.log_odds) and 0.0 <= column <= self.log_odds.shape[1]):
+            return
         hit = np.isfinite(scan.ranges)
         passed = np.where(np.isnan(scan.ranges), 0.0, np.minimum(scan.ranges, scan.range_max))
         behind = 0.5 * (self.cell + self._noise)
@@ -102,28 +123,37 @@ class ScanMap:
             unseen[part] = hidden
             self._unseen = frozen(unseen)
 
-    def clear(self, shapes: NDArray[Any], rim: float, inexact: float) -> None:
+    def clear(self, shapes: NDArray[Any], rim: float, near: FloatArray, since: FloatArray) -> None:
         """Hold the cells in polygons of Shapely (K,) for free, where they are held for occupied.
+
+        Cells of which the map is sure are walls that a polygon touches, unless they are well inside
+        it, or where it is exact were not occupied before a time.
 
         Args:
             shapes: the polygons.
-            rim: how far around them [m].
-            inexact: how far inside them those cells begin of which the map is sure [m].
+            rim: how far around them cells are cleared [m].
+            near: (K,) how inexact they are [m]: cells of which the map is not sure are cleared
+                that much farther, others that far inside.
+            since: (K,) that time [s].
         """
+        wide = rim + near
         corners = (shapely.bounds(shapes).reshape(-1, 2, 2) - self.origin) / self.cell
-        corners += [[-rim / self.cell], [rim / self.cell + 1.0]]
+        corners[:, 0] -= wide[:, None] / self.cell
+        corners[:, 1] += wide[:, None] / self.cell + 1.0
         boxes = np.clip(corners, 0.0, self.log_odds.shape[::-1]).astype(np.int64).reshape(-1, 4)
-        for shape, (c0, r0, c1, r1) in zip(shapes.tolist(), boxes.tolist(), strict=True):
+        for k, (c0, r0, c1, r1) in enumerate(boxes.tolist()):
             part = self.log_odds[r0:r1, c0:c1]
             if not (part > 0.0).any():
                 continue
             rows, columns = np.nonzero(part > 0.0)
             x, y = self.origin[:, None] + self.cell * (np.array([columns + c0, rows + r0]) + 0.5)
-            cleared = np.where(
-                part[rows, columns] >= _EVIDENCE[3],
-                shapely.contains_xy(shapely.buffer(shape, -inexact), x, y),
-                shapely.dwithin(shape, shapely.points(x, y), rim),
-            )
+            sure = part[rows, columns] >= _EVIDENCE[3]
+            new = ~self._occupied[r0:r1, c0:c1] | (self._since[r0:r1, c0:c1] > since[k])
+            new &= near[k] == 0.0
+            reach = np.where(sure, rim, wide[k])
+            cleared = shapely.dwithin(shapes[k], shapely.points(x, y), reach)
+            inside = shapely.buffer(shapes[k], -max(near[k], _DEEP * self.cell))
+            cleared &= ~sure | new[rows, columns] | shapely.contains_xy(inside, x, y)
             part[rows[cleared], columns[cleared]] = _EVIDENCE[2]
             self._changed.include(r0, c0, r1, c1)
 
@@ -136,9 +166,12 @@ class ScanMap:
             unknown: ``"free"`` or ``"obstacle"``, what cells count as that nobody has seen.
             free: polygons around which cells are free that nobody has seen, such as the robot.
         """
+        choice("treatment of unknown cells", unknown, UNKNOWN)
         part = self._changed.taken()
         odds = self.log_odds[part]
-        self._occupied[part] = (odds > 0.0) | (self._occupied[part] & (odds > _GONE))
+        occupied = (odds > 0.0) | (self._occupied[part] & (odds > _GONE))
+        self._since[part][occupied & ~self._occupied[part]] = self._time
+        self._occupied[part] = occupied
         closed = unknown == "obstacle"
         if closed or self._closed:
             part = np.s_[:, :]

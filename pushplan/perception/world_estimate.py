@@ -15,15 +15,16 @@ from pushplan.perception.lidar import LidarScan, object_outlines
 from pushplan.perception.movability import Movability
 from pushplan.perception.scan_map import ScanMap
 from pushplan.world import Goal, Movables, PriceMap, RobotModel, StaticMap, Twist, World
-from pushplan.world.checks import FloatArray, checked_bounds, choice, expect, number
+from pushplan.world.checks import FloatArray, array, checked_bounds, choice, expect, number
 from pushplan.world.occupancy_grid import UNKNOWN
 from pushplan.world.outline import transform
 from pushplan.world.unseen import Unseen
 
 _CELLS = 8.0  # to the inscribed radius of the robot
-_RIM = 1.5  # cells around an object in which a beam is taken to have hit the object
+_RIM = 1.5  # cells around an object in which a beam that meets it is taken to have hit it
+_MEETS = 0.5  # cells within which a beam meets an object, or a cell of the map is of the object
 _INEXACT = 0.75  # cells by which a wall may stand nearer than the map has it
-_BEHIND = 2.0  # cells behind an object that most beams which would hit it have to reach: it is gone
+_INTO = 2.0  # cells that most beams which would hit an object have to reach into it: it is gone
 _MOST_CELLS = 4e6  # of a map whose cells nobody has chosen
 
 
@@ -42,6 +43,7 @@ class WorldEstimate:
         cell: side of the cells of the map [m]; if None an eighth of the robot's inscribed radius,
             and more where that were more than 4 million cells; never less than ``range_noise``.
         position_noise: standard deviation of the positions of detected objects [m].
+        heading_noise: the same of their headings [rad].
         range_noise: standard deviation of the distances in scans [m].
         unknown: ``"free"`` or ``"obstacle"``, what counts where nobody has looked.
         unknown_price: price of a metre where nobody has looked, see `pushplan.world.PriceMap`.
@@ -72,6 +74,7 @@ class WorldEstimate:
         known: StaticMap | None = None,
         cell: float | None = None,
         position_noise: float = 0.0,
+        heading_noise: float = 0.0,
         range_noise: float = 0.0,
         unknown: str = "free",
         unknown_price: float = 0.0,
@@ -90,7 +93,8 @@ class WorldEstimate:
         self._drift = number("drift", drift, low=0.0)
         place = number("position_noise", position_noise, low=0.0)
         range_noise = number("range_noise", range_noise, low=0.0)
-        self._near = 2.0 * math.hypot(place, range_noise)
+        self._inexact = math.hypot(place, range_noise)
+        self._turned = number("heading_noise", heading_noise, low=0.0)
         if cell is None:
             x0, y0, x1, y1 = checked_bounds("bounds", bounds).tolist()
             cell = robot.inscribed_radius / _CELLS
@@ -117,16 +121,26 @@ class WorldEstimate:
         return self._drift * np.sqrt(self.unseen_s)
 
     def add_detections(self, detections: Detections) -> None:
-        """Take the objects that were seen at one time; older ones than before change nothing."""
+        """Take the objects that were seen at one time; older ones than before change nothing.
+
+        What scans have hit of an object before it was seen, or since, is not static.
+        """
         seen = expect("detections", detections, Detections).objects
         time = detections.time
-        new = [time > self._seen_at.get(label, -math.inf) for label in seen.ids.tolist()]
-        seen = seen.select(np.array(new, dtype=np.bool_))
+        before = np.array([self._seen_at.get(label, -math.inf) for label in seen.ids.tolist()])
+        seen = seen.select(before < time)
+        since = before[before < time][seen.part_owners]
         self._seen_at |= dict.fromkeys(seen.ids.tolist(), time)
         self._time = max(self._time, time)
         self.objects = self.objects.updated(seen)
         if self._known is None:
-            self.map.clear(_polygons(seen), 0.5 * self.map.cell, self._near)
+            near = self._near(seen)[seen.part_owners]
+            self.map.clear(_polygons(seen), _MEETS * self.map.cell, near, since)
+
+    def _near(self, objects: Movables) -> FloatArray:
+        """(K,) distance from objects at which beams may have hit them [m]."""
+        near: FloatArray = 2.0 * np.hypot(self._inexact, self._turned * objects.radii)
+        return near
 
     def add_scan(self, scan: LidarScan) -> None:
         """Take a laser scan."""
@@ -135,10 +149,16 @@ class WorldEstimate:
         hit = np.isfinite(scan.ranges)
         of_object = np.zeros(len(hit), dtype=np.bool_)
         if hit.any() and len(self.objects):
-            tree = shapely.STRtree(_polygons(self.objects))
-            points = shapely.points(scan.points)
-            beams, _ = tree.query(points, "dwithin", _RIM * self.map.cell + self._near)
-            of_object[np.flatnonzero(hit)[beams]] = True
+            shapes = _polygons(self.objects)
+            near = self._near(self.objects)[self.objects.part_owners]
+            points = scan.points
+            reach = _RIM * self.map.cell + near.max()
+            beams, met = shapely.STRtree(shapes).query(shapely.points(points), "dwithin", reach)
+            ways = shapely.linestrings(
+                np.stack([np.tile(scan.pose[:2], (len(beams), 1)), points[beams]], 1)
+            )
+            crossing = shapely.dwithin(ways, shapes[met], _MEETS * self.map.cell + near[met])
+            of_object[np.flatnonzero(hit)[beams[crossing]]] = True
         self.map.add(scan, of_object)
 
     def _forget(self, scan: LidarScan) -> None:
@@ -157,9 +177,11 @@ class WorldEstimate:
         maybe = ((off <= width[:, None]) & (seen > away[:, None])).any(axis=1)
         missed = []
         for k in np.flatnonzero(maybe).tolist():
-            ends = _far_sides(objects.select([k]), scan)
+            one = objects.select([k])
+            begins, ends = _crossed(one, scan)
             met = np.isfinite(ends) & (seen > 0.0)
-            beyond = met & (seen > ends + _BEHIND * self.map.cell + self._near)
+            least = begins + _INTO * self.map.cell + float(self._near(one)[0])
+            beyond = met & (seen > np.maximum(least, 0.5 * (begins + ends)))
             if met.any() and 2 * beyond.sum() > met.sum():
                 missed.append(k)
         if missed:
@@ -180,11 +202,12 @@ class WorldEstimate:
             twist: (3,) of the robot in the world frame [m/s, m/s, rad/s]; at rest if None.
             time: [s].
         """
+        pose = array("pose", pose, (3,))
         static = self._known
         if static is None:
             free = []
             if self._unknown == "obstacle":
-                parts = [transform(np.asarray(pose), one) for one in self._robot.contact_parts]
+                parts = [transform(pose, one) for one in self._robot.contact_parts]
                 free = [*_polygons(self.objects), *map(shapely.Polygon, parts)]
             static = self.map.static_map(unknown=self._unknown, free=free)
         cells = self.map.unseen
@@ -196,7 +219,7 @@ class WorldEstimate:
             )
         world = World(
             self._robot,
-            pose,  # type: ignore[arg-type]
+            pose,
             static,
             self.objects,
             self._goal,
@@ -209,8 +232,12 @@ class WorldEstimate:
         return self.movability.update(world)
 
 
-def _far_sides(one: Movables, scan: LidarScan) -> FloatArray:
-    """(N,) where the beams of a scan would leave an object [m]; infinite where they miss it."""
+def _crossed(one: Movables, scan: LidarScan) -> tuple[FloatArray, FloatArray]:
+    """Distances at which beams would enter and leave an object [m]; infinite if they miss it.
+
+    Returns:
+        (N,) and (N,).
+    """
     corners, starts = object_outlines(one)
     following = np.arange(1, len(corners) + 1)
     following[starts[1:] - 1] = starts[:-1]
@@ -223,8 +250,9 @@ def _far_sides(one: Movables, scan: LidarScan) -> FloatArray:
         away = (a[:, 0] * edge[:, 1] - a[:, 1] * edge[:, 0]) / across
         part = (a[:, 0] * along[..., 1] - a[:, 1] * along[..., 0]) / across
     crossed = (away > 0.0) & (part >= 0.0) & (part <= 1.0)
+    begins = np.where(crossed, away, np.inf).min(axis=1, initial=np.inf)
     ends = np.where(crossed, away, -np.inf).max(axis=1, initial=-np.inf)
-    return np.where(np.isfinite(ends), ends, np.inf)
+    return begins, np.where(np.isfinite(ends), ends, np.inf)
 
 
 def _polygons(objects: Movables) -> NDArray[Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,8 +10,10 @@ import numpy as np
 import pytest
 
 from pushplan.cli import main
+from pushplan.cli.common import load_episode
 from pushplan.control import ImmediateExecutor
-from pushplan.interaction import ContactParameters, QuasiStatic
+from pushplan.interaction import ContactParameters, QuasiStatic, find_pushes, identify
+from pushplan.perception import Detector, Lidar, WorldEstimate
 from pushplan.ros import McapLog
 from pushplan.runtime import Runner
 from pushplan.world import (
@@ -50,17 +53,20 @@ def scene() -> World:
     )
 
 
-@pytest.fixture(scope="module")
-def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Record of a `Runner` that pushed a box, which moved as a model says."""
-    path = tmp_path_factory.mktemp("log") / "robot.mcap"
+def drive(path: Path, seen: Callable[[World], World] = lambda world: world) -> Path:
+    """Record of a `Runner` that pushed a box, which moved as a model says.
+
+    Args:
+        path: of the log.
+        seen: what is known of a scene.
+    """
     model = QuasiStatic(friction=0.5, gyration_scale=1.4)
     world = scene()
     with (
         McapLog(path) as kept,
         Runner(Winding(), period=PERIOD, log=kept, executor=ImmediateExecutor()) as runner,
     ):
-        command = runner.start(world)
+        command = runner.start(seen(world))
         for _ in range(120):
             x, y, theta = world.robot_pose
             turn = command.twist.angular * PERIOD
@@ -72,9 +78,15 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
             ]
             swept = model.sweep(world, [world.robot_pose, pose]).object_poses[-1]
             world = world.moved(robot_pose=pose, movable_poses=swept, time=world.time + PERIOD)
-            runner.update(world)
+            runner.update(seen(world))
             command = runner.command(world.time)
     return path
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Record of a robot that was told the scene."""
+    return drive(tmp_path_factory.mktemp("log") / "robot.mcap")
 
 
 @pytest.mark.slow
@@ -94,6 +106,32 @@ def test_a_robots_log_gives_parameters_for_the_next_run(
     assert found.friction == pytest.approx(0.5, abs=0.25)
     with Runner("push-aware", period=PERIOD, contact=found) as runner:
         assert runner.policy.planner.interaction == found.model()
+
+
+@pytest.mark.slow
+def test_pushes_that_a_robot_has_seen_itself_give_them_too(tmp_path: Path) -> None:
+    """The box comes into view on the way; nobody has told the robot of it."""
+    start = scene()
+    noise = 0.001
+    lidar = Lidar(range=3.0, noise=noise)
+    detector = Detector(range=0.2, position_noise=noise, heading_noise=noise)
+    estimate = WorldEstimate(
+        start.robot, start.goal, (-2, -2, 4, 4), position_noise=noise, range_noise=noise
+    )
+    rng = np.random.default_rng(0)
+    seen: list[int] = []
+
+    def look(world: World) -> World:
+        estimate.add_detections(detector.detect(world, rng))
+        estimate.add_scan(lidar.scan(world, rng))
+        known = estimate.world(world.robot_pose, world.robot_twist, world.time)
+        seen.append(len(known.movables))
+        return known
+
+    found = identify(find_pushes(load_episode(str(drive(tmp_path / "robot.mcap", look)))))
+    assert seen[0] == 0 and seen[-1] == 1
+    assert found.gyration_scale == pytest.approx(1.4, rel=0.1)
+    assert found.friction == pytest.approx(0.5, abs=0.1)
 
 
 def one_line(capsys: pytest.CaptureFixture[str]) -> str:

@@ -12,7 +12,16 @@ from conftest import make_robot
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pushplan.perception import Detections, Detector, Lidar, LidarScan, ScanMap, WorldEstimate
+from pushplan.perception import (
+    Detections,
+    Detector,
+    Lidar,
+    LidarObservation,
+    LidarScan,
+    Movability,
+    ScanMap,
+    WorldEstimate,
+)
 from pushplan.world import GoalDisc, InvalidInputError, Movables, StaticMap, Twist, World
 
 BOX = np.array([(-0.2, -0.2), (0.2, -0.2), (0.2, 0.2), (-0.2, 0.2)])
@@ -59,6 +68,16 @@ def look(belief: WorldEstimate, world: World, lidar=None, detector=None) -> Worl
     belief.add_detections((detector or Detector()).detect(world))
     belief.add_scan((lidar or Lidar()).scan(world))
     return belief.world(world.robot_pose, world.robot_twist, world.time)
+
+
+class _Turned:
+    """A detector that says headings with noise."""
+
+    def __init__(self, rng):
+        self._rng = rng
+
+    def detect(self, world: World) -> Detections:
+        return Detector(heading_noise=0.05).detect(world, self._rng)
 
 
 class TestLidar:
@@ -205,7 +224,7 @@ class TestScanMap:
             chart.add(scan, np.zeros(len(scan.bearings), dtype=bool))
             if rng.random() < 0.3:
                 box = shapely.box(*at[:2], at[0] + 0.5, at[1] + 0.5)
-                chart.clear(np.array([box]), 0.05, 0.05)
+                chart.clear(np.array([box]), 0.05, np.array([0.05]), np.array([-math.inf]))
             unknown = str(rng.choice(["free", "obstacle"]))
             parts = map(shapely.Polygon, chart.static_map(unknown=unknown).polygons)
             solid = shapely.union_all(list(parts))
@@ -281,6 +300,58 @@ class TestWorldEstimate:
         solid = belief.world((0.0, 0.0, 0.0), None, 30.0).static
         walls = shapely.union_all([shapely.Polygon(part) for part in solid.convex_parts])
         assert walls.intersection(shapely.box(1.4, -0.15, 1.65, 0.15)).area > 0.01
+
+    @pytest.mark.parametrize("depth", [0.0, 0.01, 0.03])
+    def test_a_wall_along_which_an_object_slides_stays(self, depth):
+        """Nobody sees the wall where the box leans on it; the map remembers it."""
+        belief = estimate()
+        wall_of = [wall(1.5, -1.0, 1.7, 1.0)]
+        look(belief, hall(walls=wall_of))
+        for time in range(1, 30):
+            box = (1.3 + depth, -0.5 + 0.03 * time, 0.0)
+            look(belief, hall([box], wall_of, time=time))
+        solid = belief.world((0.0, 0.0, 0.0), None, 30.0).static
+        walls = shapely.union_all([shapely.Polygon(part) for part in solid.convex_parts])
+        face = shapely.LineString([(1.525, -0.8), (1.525, 0.8)])
+        assert walls.buffer(1e-6).intersection(face).length > 0.98 * face.length
+
+    def test_a_wall_beside_an_object_is_drawn(self):
+        """The box hides none of it, and is a centimetre away."""
+        belief = estimate()
+        beside = [wall(1.0, 0.21, 1.4, 0.6)]
+        for time in range(4):
+            world = look(belief, hall([(1.2, 0.0, 0.0)], beside, (-1.0, 0.9, 0.0), time))
+        walls = shapely.union_all([shapely.Polygon(part) for part in world.static.convex_parts])
+        face = shapely.LineString([(1.0, 0.22), (1.0, 0.6)])
+        assert walls.buffer(0.04).intersection(face).length > 0.95 * face.length
+
+    def test_an_object_that_has_left_a_corner_is_forgotten(self):
+        belief = estimate()
+        rng = np.random.default_rng(0)
+        assert len(look(belief, hall([(3.79, 2.79, 0.0)])).movables) == 1
+        for time in range(1, 4):
+            at = (*rng.uniform(-2.0, 2.0, 2), 0.0)
+            belief.add_scan(Lidar().scan(hall(at=at, time=time)))
+        assert len(belief.objects) == 0
+
+    def test_a_turn_that_was_seen_wrongly_makes_no_walls(self):
+        belief = estimate(heading_noise=0.05)
+        rng = np.random.default_rng(2)
+        long = Movables.from_outlines([[(-1, -0.2), (1, -0.2), (1, 0.2), (-1, 0.2)]], [(1.5, 0, 1)])
+        for time in range(20):
+            there = replace(hall(time=time), movables=long)
+            world = look(belief, there, detector=_Turned(rng))
+        assert (to_walls(world.static.packed[0]) < 0.2).all()
+
+    def test_a_scan_from_beyond_the_map_says_nothing(self):
+        chart = ScanMap(HALL, 0.1)
+        far = LidarScan(0.0, (2.0, -9.0, math.pi / 2), [-0.3, 0.3], [3.0, 8.0], 10.0)
+        chart.add(far, np.zeros(2, dtype=bool))
+        assert chart.unseen.all() and not chart.static_map().polygons
+        with pytest.raises(InvalidInputError, match="ignored must be 2 truths"):
+            chart.add(far, np.zeros(3, dtype=bool))
+        with pytest.raises(InvalidInputError, match="unknown cells"):
+            chart.static_map(unknown="blocked")
 
     def test_noise_is_no_motion(self):
         belief = estimate(position_noise=0.02)
@@ -401,3 +472,60 @@ class TestWorldEstimate:
         belief.add_scan(LidarScan(0.0, np.zeros(3), np.zeros(0), np.zeros(0), 5.0))
         world = belief.world((0.0, 0.0, 0.0), None, 0.0)
         assert world.static.is_empty and world.unseen is not None and world.unseen.cells.all()
+
+
+class TestMovability:
+    def drive(self, commands, beside=(2.0, 0.0)) -> set[int]:
+        """Ids of what has stopped a robot that hardly moves, next to a box."""
+        x, y = beside
+        world = hall([(x, y, 0.0)])
+        x = x - 0.2 - ROBOT.vertices[:, 0].max() if abs(y) < 0.1 else x
+        belief = Movability(ROBOT)
+        for k, command in enumerate([*commands, Twist(0.0, 0.0)]):
+            there = replace(world, robot_pose=(x + 0.002 * k / len(commands), 0.0, 0.0))
+            belief.update(replace(there, time=0.1 * k))
+            belief.send(command)
+        return belief.stopped_by
+
+    def test_what_is_ahead_has_stopped_it(self):
+        assert self.drive([Twist(0.2, 0.0)] * 25) == {0}
+
+    @pytest.mark.parametrize("before", [Twist(-0.2, 0.0), Twist(0.0, 0.8)])
+    def test_what_it_meets_after_it_was_stopped_elsewhere_has_not(self, before):
+        assert self.drive([before] * 25 + [Twist(0.2, 0.0)] * 2) == set()
+
+    def test_what_is_beside_it_has_not(self):
+        side = 0.2 + ROBOT.vertices[:, 1].max() - 1e-4
+        assert self.drive([Twist(0.2, 0.0)] * 25, (0.0, side)) == set()
+
+    def test_bad_input_is_refused(self):
+        with pytest.raises(InvalidInputError, match="position_noise"):
+            Movability(ROBOT, -1.0)
+        with pytest.raises(InvalidInputError, match="robot must be a RobotModel"):
+            Movability(None)
+        with pytest.raises(InvalidInputError, match="command must be a Twist"):
+            Movability(ROBOT).send((0.1, 0.0))
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda world, bad: Lidar().scan(bad),
+        lambda world, bad: Lidar().scan(world, bad),
+        lambda world, bad: Detector().detect(bad),
+        lambda world, bad: Detector().detect(world, bad),
+        lambda world, bad: Detector().visible(bad),
+        lambda world, bad: LidarObservation().observe(bad),
+        lambda world, bad: LidarObservation().observe_scan(bad, world),
+        lambda world, bad: estimate().sent(bad),
+        lambda world, bad: estimate().world(bad, None, 0.0),
+        lambda world, bad: estimate(unknown="obstacle").world(bad, None, 0.0),
+        lambda world, bad: ScanMap(HALL, 0.1).add(bad, np.zeros(1, dtype=bool)),
+        lambda world, bad: Movability(ROBOT).update(bad),
+        lambda world, bad: LidarScan(0.0, (0, 0, 0), [0.0], bad, 5.0),
+    ],
+)
+@pytest.mark.parametrize("bad", ["abc", 5, [1.0, 2.0], [10**400], [1j]])
+def test_what_has_the_wrong_type_is_refused(call, bad):
+    with pytest.raises(InvalidInputError):
+        call(hall(), bad)
