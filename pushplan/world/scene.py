@@ -201,7 +201,7 @@ class World(ArrayRecord, CheckedFields):
             here = robot is None or robot.reached_by(self.robot_pose)
             if not here or not np.isin(self.goal.ids, self.movables.ids).all():
                 return False
-        elif self.unseen is not None:
+        elif self.unseen is not None and self.unseen.cells.any():
             return False
         return bool(self.completed.all())
 

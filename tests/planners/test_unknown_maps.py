@@ -131,6 +131,42 @@ def test_an_object_that_nobody_has_seen_is_looked_for(tmp_path):
     assert len(env.world.movables) == 1
 
 
+def test_an_object_that_cannot_be_moved_does_not_end_the_search(tmp_path):
+    """One box stands in view for good, another one behind a wall."""
+    around = [(0, 0, 4, 0), (4, 0, 4, 4), (4, 4, 0, 4), (0, 4, 0, 0), (0, 2.2, 3, 2.2)]
+    world = World(
+        turtlebot3_burger("pusher"),
+        np.array([1.5, 0.6, np.pi / 2]),
+        StaticMap.build(segments=np.array(around, dtype=float), radii=0.02, bounds=(0, 0, 4, 4)),
+        Movables.from_outlines([SQUARE] * 2, [[1.5, 1.2, 0], [1, 3.2, 0]], fixed=[True, False]),
+        ClearanceArea(
+            np.array([(0.5, 0.5), (3.5, 0.5), (3.5, 3.5), (0.5, 3.5)]), np.ones(4, dtype=bool)
+        ),
+    )
+    save_world(world, tmp_path / "world.yaml")
+    variations = {"world_file": str(tmp_path / "world.yaml"), "sensing": "objects"}
+    env = PushEnv(task="room", variations=variations, observation="state")
+    env.reset(seed=0)
+    policy = make_policy("gtsp-mpc")
+    policy.reset(env.world, np.random.default_rng(0))
+    for _ in range(700):
+        env.step(env.encode(policy.act(env.world)))
+        if len(env.world.movables) == 2:
+            break
+    assert len(env.world.movables) == 2 and env.world.movables.fixed[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 1, 7])
+def test_a_box_is_pushed_out_of_a_door_that_was_seen_before(seed):
+    """The map keeps the posts of the door, whatever leans on them."""
+    variations = {"layout": "aside", "sensing": "lidar"}
+    env = PushEnv(task="namo", variations=variations, observation="state", action="velocity")
+    scenario = Scenario("namo", variations=variations, seed=seed)
+    episode = run_episode(env, make_policy("namo"), scenario)
+    assert episode.success, episode.reason
+
+
 @pytest.mark.parametrize("policy", ["greedy", "gtsp-mpc"])
 def test_an_area_that_is_not_seen_is_not_done(policy):
     """A runner goes on while there may be objects that nobody has seen."""

@@ -181,7 +181,8 @@ class PlanFollower:
         """Return True if the robot may stand: it is at the goal, or its first plan is pending."""
         if self.current_plan is None:
             found_none = bool(self.plan_log) and self.plan_log[-1].plan is None
-            if found_none and self._map_has_changed and self.plan_log[-1].status in _CLOSED:
+            by_itself = self._map_has_changed and world.unseen is None  # not by looking
+            if found_none and by_itself and self.plan_log[-1].status in _CLOSED:
                 return True  # it waits before a door, and does not get free
             return self._pending is not None and not found_none
         there = isinstance(world.goal, GoalDisc | GoalLine) and world.goal_reached

@@ -48,9 +48,11 @@ class RearrangementPolicy(ABC):
         return self._clock.command_for(world, self._act_or_look)
 
     def _act_or_look(self, world: World) -> Twist:
-        """The velocity for an instant; looks around where no object is known that is left."""
-        idle = self._recovery is None and world.completed.all() and not world.goal_reached
+        """The velocity for an instant; looks around where no object is known that can be moved."""
+        idle = (world.completed | world.movables.fixed).all() and not world.goal_reached
         if world.unseen is not None and idle:
+            if (back := self._recover(world)) is not None:
+                return back
             if self._look_around is None:  # it imports what nothing else here needs
                 module = need("pushplan.planners.rearrangement.look_around")
                 self._look_around = module.LookAround(self._executor, self._rng)
