@@ -165,6 +165,7 @@ def stress(
     Raises:
         UnknownNameError: if there is no such policy, suite or condition.
         UnusablePolicyError: if the policy cannot run in any of the scenarios.
+        ScenarioError: if a condition makes no sense in them, such as noise of sensors without any.
     """
     rate = number("rate", rate, low=0.0, open_low=True)
     (chosen,) = suites_of(suite, episodes, seed)
@@ -188,6 +189,7 @@ def stress(
             make = partial(_disturbed, spec, condition.disturbances, period, planning_time, noise)
             varied = replace(scenario, variations=Variations(variations))
             jobs.append(Job(PolicySpec(label, make), varied))
+        JobSettings().environment(varied, None).close()
     jobs.sort(key=lambda job: job.key[2])  # a test that is cut short still compares conditions
     with tempfile.TemporaryDirectory(prefix="pushplan-") as temporary:
         rows = run_batch(

@@ -55,6 +55,8 @@ def test_what_makes_no_sense_is_one_error():
         stress("straight", "maze-2d-3", conditions=["fog"], episodes=1, workers=0)
     with pytest.raises(InvalidInputError, match="rate must lie"):
         stress("straight", "maze-2d-3", rate=0.0, episodes=1, workers=0)
+    with pytest.raises(InvalidInputError, match="robot with sensors: sensing must be"):
+        stress("straight", "maze-2d-3", conditions=["sensor-noise"], episodes=1, workers=0)
     with pytest.raises(InvalidInputError, match="at least one scenario"):
         stress("straight", [], workers=0)
 

@@ -42,6 +42,17 @@ FRICTIONS = {
     "ground_friction": "object_ground",
 }
 """Variation -> the field of `Materials` that it replaces."""
+_OF_SENSORS = (
+    "view_angle",
+    "range_noise",
+    "object_noise",
+    "turn_noise",
+    "drop_out",
+    "view_rate",
+    "view_delay",
+    "unknown_price",
+)
+"""Variations that mean nothing where everything is seen."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,6 +95,17 @@ class TaskVariations(CheckedFields):
 
     task: ClassVar[str] = "this task"
     """Name of the task."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.sensing != "full":
+            return
+        for name in _OF_SENSORS:
+            if (value := getattr(self, name)) != getattr(type(self), name):
+                raise InvalidInputError(
+                    f"{name} {value!r} belongs to a robot with sensors: sensing must be objects or "
+                    "lidar with it, got full"
+                )
 
     def limit(self, robot: RobotModel) -> RobotModel:
         """The robot of a preset with these limits of speed and turn rate."""
