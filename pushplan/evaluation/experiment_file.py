@@ -158,6 +158,8 @@ def _suite(given: object, episodes: int, each: int, seed: int, folder: Path) -> 
         replace(one, variations={**one.variations, **changes}) for one in found.scenarios
     )
     name = expect("label", entry.get("label", found.name), str)
+    if "task" in entry and "label" in entry:
+        scenarios = tuple(replace(one, name=name) for one in scenarios)
     return Suite(f"{name}[{words}]" if words else name, found.version, scenarios)
 
 

@@ -173,7 +173,7 @@ def _world_files(given: Path) -> list[Path]:
     if given.is_file() and _is_world(given):
         return [given]
     if not given.exists():
-        raise SchemaError(f"folder of worlds {given}: no such folder")
+        raise SchemaError(f"worlds {given}: no such file or folder")
     inside = sorted(given.iterdir()) if given.is_dir() else []
     worlds = [one for one in inside if one.suffix in (".yaml", ".yml", ".json") and _is_world(one)]
     if not worlds:

@@ -226,7 +226,7 @@ class TestSuites:
         (folder / "b.yaml").unlink()
         with pytest.raises(SchemaError, match="in it says schema: pushplan-world"):
             world_suite(folder)
-        with pytest.raises(SchemaError, match="no such folder"):
+        with pytest.raises(SchemaError, match="no such file or folder"):
             world_suite(folder / "none")
 
     def test_in_an_experiment_a_changed_file_is_run_again(
@@ -256,7 +256,7 @@ class TestSuites:
         for entry, words in (
             ({"worlds": "rooms", "suite": "maze-2d-3"}, "either 'suite'"),
             ({"suite": "maze-2d-3", "simulator": "mujoco"}, "simulator"),
-            ({"worlds": "nothere"}, "no such folder"),
+            ({"worlds": "nothere"}, "no such file or folder"),
         ):
             with pytest.raises(SchemaError, match=words):
                 Experiment.from_dict({**data, "suites": [entry]}, folder.parent)

@@ -11,7 +11,7 @@ import yaml
 
 from pushplan.cli import main
 from pushplan.envs.tasks.room import SMALL_ROOM
-from pushplan.evaluation import Experiment, Results, bench, compare_runs
+from pushplan.evaluation import Experiment, Results, bench, compare_runs, verify
 from pushplan.evaluation.benchmark import suites_of
 from pushplan.scenarios import Scenario, Suite, load_scenarios, save_scenarios, suite, world_suite
 from pushplan.world import InvalidInputError, SchemaError, load_world, save_world
@@ -63,6 +63,48 @@ def test_a_folder_of_worlds_is_one_setting_whose_scenarios_are_its_files(
     assert (out / "intervals.svg").is_file()
     (verdict,) = compare_runs(out, out / "results.csv", "E_nav<-0.1")[:1]
     assert (verdict.setting, verdict.count) == ("kitchens", 4)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("pose: [", "pose: [.nan, "), "b.yaml: robot.pose must"),
+        (("goal:", "gaol:"), "gaol"),
+        (("center: [", "center: [-90.0, "), "b.yaml"),
+    ],
+)
+def test_a_world_that_nobody_could_drive_in_is_refused_before_anything_runs(
+    tmp_path: Path, change: tuple[str, str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The first world is fine, so that the policy fits."""
+    folder = folder_of(tmp_path / "kitchens", "a.yaml", "b.yaml")
+    text = (folder / "b.yaml").read_text()
+    (folder / "b.yaml").write_text(text.replace(*change, 1))
+    out = tmp_path / "run"
+    assert main(["bench", f"{folder}/", "--policies", "straight", "--out", str(out)]) == 2
+    assert said in capsys.readouterr().err and not (out / "results.csv").exists()
+
+
+def test_the_same_drive_again_and_again_counts_once_in_a_test(tmp_path: Path) -> None:
+    folder_of(tmp_path / "kitchens", "a.yaml", "b.yaml")
+    given = {"worlds": "kitchens", "episodes": 3}
+    results = experiment(tmp_path, given, policies=["straight", "other=straight"]).run(workers=0)
+    assert len(results.rows) == 12
+    assert {pair.difference.count for pair in results.compare()} == {2}
+
+
+def test_a_world_that_is_gone_is_named_when_a_run_is_verified(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path / "kitchens", "a.yaml")
+    experiment(tmp_path, {"worlds": "kitchens"}).run(workers=0, out=tmp_path / "run")
+    folder.rename(tmp_path / "elsewhere")
+    with pytest.raises(InvalidInputError, match=r"world_file .*a\.yaml of job .* is missing"):
+        verify(tmp_path / "run", workers=1)
+
+
+def test_a_label_names_a_task_in_tables(tmp_path: Path) -> None:
+    maze = {"task": "maze", "label": "few", "episodes": 1, "variations": {"boxes": 1}}
+    results = experiment(tmp_path, maze).run(workers=0)
+    assert list(results.titles.values()) == ["few[boxes=1]"]
 
 
 def test_files_of_one_name_in_two_folders_have_names_of_their_own(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -47,10 +48,12 @@ def misfits(
 
     Raises:
         UnusablePolicyError: if a policy cannot be made, or fits no suite.
+        PushplanError: if a file of a suite, such as a world, cannot be used by any policy.
     """
     known: dict[tuple[str, str], str | None] = {}
     found: dict[tuple[str, str], str] = {}
     worlds: dict[tuple[str, str], World] = {}
+    made: set[str] = set()
     starts = {
         suite.name: {Job(specs[0], scenario).title: scenario for scenario in suite.scenarios}
         for suite in suites
@@ -63,13 +66,27 @@ def misfits(
                 if (spec.label, title) not in known:
                     known[spec.label, title] = incompatibility(spec, scenario, settings, worlds)
                 if (reason := known[spec.label, title]) is None:
+                    made.add(_scene(scenario))
                     found.pop((suite.name, spec.label), None)
                     break
                 found[suite.name, spec.label] = reason
                 first = first or f"{title}: {reason}"
         if not allow_all and first and all((suite.name, spec.label) in found for suite in wanted):
             raise UnusablePolicyError(f"policy {spec.label!r} cannot run {first}")
+    for suite in suites:
+        if all((suite.name, spec.label) in found for spec in specs):
+            continue
+        for scenario in suite.scenarios:
+            if (scene := _scene(scenario)) not in made:  # such as another world
+                made.add(scene)
+                settings.environment(scenario, None).close()
     return found
+
+
+def _scene(scenario: Any) -> str:
+    """Text that is the same for scenarios whose environments are alike."""
+    of = (scenario.task, scenario.simulator, scenario.preset, dict(scenario.variations))
+    return json.dumps(of, sort_keys=True)
 
 
 def is_wanted(spec: PolicySpec, suite: Suite, only: Mapping[str, Sequence[str]]) -> bool:

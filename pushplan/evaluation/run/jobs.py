@@ -63,8 +63,9 @@ class Job:
         """The scenario without its seed, in words."""
         data = self.scenario.to_dict()
         parts = [str(data[key]) for key in ("task", "simulator", "preset") if key in data]
-        words = map(os.path.basename, parts)  # of a user's task without its folder
-        extra = [f"{key}={value}" for key, value in data.get("variations", {}).items()]
+        changes = data.get("variations", {}).items()
+        extra = [f"{key}={os.path.basename(str(value))}" for key, value in changes]
+        words = map(os.path.basename, parts)  # of files without their folders
         return " ".join([*words, *extra])
 
 
@@ -103,7 +104,7 @@ class JobSettings(CheckedFields):
             return None
         return self.timeout_s + self.grace_s
 
-    def environment(self, scenario: Any, policy: Policy, **options: Any) -> Any:
+    def environment(self, scenario: Any, policy: Policy | None, **options: Any) -> Any:
         """A fresh environment for one job; ``options`` go to its factory."""
         observation = self.observation
         if observation == "auto":

@@ -152,7 +152,11 @@ def verify(
 
 def _job_of(path: str | Path, stored: StoredResult) -> tuple[Job, JobSettings]:
     try:
-        return job_of(stored.spec)
+        job, settings = job_of(stored.spec)
+        for name, value in job.scenario.variations.items():
+            if name.endswith("_file") and value is not None and not Path(value).is_file():
+                raise InvalidInputError(f"{name} {value} of job {stored.row.job} is missing")
+        return job, settings
     except PushplanError:
         raise
     except Exception as error:  # a stranger may have written it

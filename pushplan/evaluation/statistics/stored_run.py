@@ -17,7 +17,7 @@ from pushplan.evaluation.statistics.summary import (
     settings_of,
     summarise,
 )
-from pushplan.evaluation.store.rows import ResultRow
+from pushplan.evaluation.store.rows import ResultRow, columns
 from pushplan.evaluation.store.run_directory import open_results
 from pushplan.world import Episode
 
@@ -72,6 +72,7 @@ class StoredRun:
         return {
             name: [self.measured.get(row.job, {}).get(name) for row in self.rows]
             for name in self.about.get("metrics", ())
+            if name not in columns()
         }
 
     def rows_of(self, setting: str) -> list[ResultRow]:

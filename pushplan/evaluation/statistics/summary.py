@@ -20,7 +20,7 @@ from pushplan.evaluation.statistics.estimates import (
     signed_rank_test,
     wilson,
 )
-from pushplan.evaluation.store.rows import ResultRow
+from pushplan.evaluation.store.rows import ResultRow, setting_of
 from pushplan.metrics import METRICS, Role, metric_names
 from pushplan.world.checks import FloatArray, choice
 
@@ -137,7 +137,8 @@ def paired_differences(
     """Pairs of policies on the scenarios that both ran, for success, scores and lengths.
 
     Metrics of which neither direction is better are left out. Path and work are compared where
-    both succeed: who fails has driven and pushed less.
+    both succeed: who fails has driven and pushed less. Scenarios in which both drive just as in
+    another one, as in a world without spread, count once.
 
     Args:
         rows: of a run.
@@ -149,6 +150,7 @@ def paired_differences(
         compared = [pair for pair in compared if pair[0] == compared[0][0]]
     groups = grouped(rows)
     settings = settings_of(rows)
+    drives = {key: {(r.scenario, r.seed): _drive(r) for r in mine} for key, mine in groups.items()}
     found: list[PairedDifference] = []
     for metric in ("success", *metric_names(Role.SCORE, Role.DETAIL)):
         if (higher := METRICS[metric].higher_is_better) is None:
@@ -164,7 +166,11 @@ def paired_differences(
                 one = values.get((setting, first), {})
                 two = values.get((setting, second), {})
                 if common := sorted(one.keys() & two.keys()):
-                    gaps[setting, first, second] = np.array([two[k] - one[k] for k in common])
+                    pairs_of = {
+                        (drives[setting, first][k], drives[setting, second][k]): two[k] - one[k]
+                        for k in common
+                    }
+                    gaps[setting, first, second] = np.array(list(pairs_of.values()))
         tested = [signed_rank_test(gap) for gap in gaps.values()]
         corrected = holm([p_value for p_value, _ in tested])
         sign = 1.0 if higher else -1.0
@@ -204,6 +210,13 @@ def policies_of(rows: Sequence[ResultRow], order: Sequence[str] = ()) -> list[st
 def values_of(rows: Sequence[ResultRow], metric: str) -> list[float]:
     """The values of a column, without empty fields."""
     return [float(v) for row in rows if (v := getattr(row, metric)) is not None]
+
+
+def _drive(row: ResultRow) -> object:
+    """Value that is the same for two rows of a policy that drove alike, to the last digit."""
+    if row.failed or not row.metrics.get("path_length_m"):
+        return (row.scenario, row.seed)
+    return (setting_of(row.scenario, row.seed), row.reason, *sorted(row.metrics.items()))
 
 
 def by_scenario(rows: Sequence[ResultRow], metric: str) -> dict[tuple[str, int], float]:

@@ -64,7 +64,7 @@ def rescore(path: str | Path, metrics: Sequence[str] = (), *, columns: bool = Tr
                 unreadable.append(row.job)
                 continue
             scored += 1
-            if missing:
+            if not known.keys().isdisjoint(missing):  # it may show what they were
                 remove_report(store.path)
             new = scored_row(row, episode, row.plan_calls) if columns else row
             if new != row:
