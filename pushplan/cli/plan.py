@@ -12,7 +12,7 @@ from pushplan.cli.common import milliseconds, say, say_json, say_written
 from pushplan.cli.output_files import check_figure, check_file
 
 if TYPE_CHECKING:
-    from pushplan.world import PlanResult, Stop
+    from pushplan.world import PlanResult, Stop, World
 
 SCHEMA = "pushplan-plan/1"
 
@@ -44,6 +44,7 @@ def run(options: argparse.Namespace) -> int:
     try:
         made = planner.plan(world, stop=stop, rng=stream(options.seed, "policy"))
         result = expect("what the planner returns", made, PlanResult)
+        objection = None if spec.is_ours else _objection(world, result)
     except (Exception, SystemExit) as error:
         if spec.is_ours:
             raise
@@ -62,7 +63,30 @@ def run(options: argparse.Namespace) -> int:
         figure = draw_figure(Panel(world, plan=result.plan))
         save_figure(options.render, figure, title=title)
     say_written(options, options.out, options.render)
+    if objection is not None:
+        raise PushplanError(f"planner {spec.label!r} says {result.status.label}, but {objection}")
     return 0 if result.plan is not None else 1
+
+
+def _objection(world: World, result: PlanResult) -> str | None:
+    """Reason why the plan of a user's planner is not solved as it says; None if it is."""
+    from pushplan.motion.polyline_plan import blocked_pose
+    from pushplan.planners.following.planning_call import check_plan
+    from pushplan.world import PlanStatus
+
+    plan = result.plan
+    if plan is None:
+        return None
+    check_plan(plan, world)
+    if result.status is not PlanStatus.SOLVED:
+        return None
+    if (blocked := blocked_pose(world, plan.poses)) is not None:
+        x, y, _ = blocked.tolist()
+        return f"at [{x:.6g}, {y:.6g}] the robot touches something static: path_only says so"
+    if world.goal_kind == "robot" and not world.navigation_goal.reached_by(plan.poses[-1]):
+        x, y, _ = plan.poses[-1].tolist()
+        return f"the plan ends at [{x:.6g}, {y:.6g}], short of the goal: approximate says so"
+    return None
 
 
 def _print(name: str, result: PlanResult) -> None:

@@ -67,23 +67,35 @@ def polyline_status(world: World, plan: Plan) -> PlanStatus:
     turns = np.abs(wrap_angle(moves[:, 2]))
     lasts = np.diff(plan.times)
     fast = turns > robot.max_turn_rate * lasts + 1e-9
-    lengths = np.hypot(moves[:, 0], moves[:, 1])
     fast |= turns * robot.min_turning_radius > plan.speeds[:-1] * lasts + 1e-9
     fast |= (turns > 1e-9) & math.isfinite(robot.max_turn_acceleration)  # all at once, at a corner
     near = 1e-9 * robot.circumscribed_radius
     if np.abs(off[:2]).max() > near or abs(math.remainder(off[2], math.tau)) > 1e-9 or fast.any():
         return PlanStatus.PATH_ONLY
-    step = _FINE * robot.circumscribed_radius
-    counts = np.maximum(np.ceil(lengths / step), 1.0).astype(np.int64)
-    first = np.repeat(np.arange(len(moves)), counts)
-    fraction = (np.arange(len(first)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[
-        first
-    ]
-    dense = np.concatenate([poses[first] + fraction[:, None] * moves[first], poses[-1:]])
-    checker = core.CollisionChecker(footprint(robot), obstacles(world.static))
-    if checker.first_blocked(dense) < len(dense):
+    if blocked_pose(world, poses) is not None:
         return PlanStatus.PATH_ONLY
     return PlanStatus.SOLVED
+
+
+def blocked_pose(world: World, poses: FloatArray) -> FloatArray | None:
+    """(3,) the first pose at which a robot that drives from pose to pose touches something static.
+
+    Between the poses (N, 3) it is looked at a fiftieth of its circumscribed radius apart. None
+    where it touches nothing.
+    """
+    moves = np.diff(poses, axis=0)
+    step = _FINE * world.robot.circumscribed_radius
+    counts = np.maximum(np.ceil(np.hypot(moves[:, 0], moves[:, 1]) / step), 1.0).astype(np.int64)
+    first = np.repeat(np.arange(len(moves)), counts)
+    begins = np.cumsum(counts) - counts
+    fraction = (np.arange(len(first)) - begins[first]) / counts[first]
+    dense = np.concatenate([poses[first] + fraction[:, None] * moves[first], poses[-1:]])
+    checker = core.CollisionChecker(footprint(world.robot), obstacles(world.static))
+    index = checker.first_blocked(dense)
+    if index == len(dense):
+        return None
+    blocked: FloatArray = dense[index]
+    return blocked
 
 
 def polyline_result(

@@ -7,13 +7,23 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from pushplan.cli import main
-from pushplan.world import Drive, GoalDisc, Movables, RobotModel, StaticMap, World, save_world
+from pushplan.world import (
+    Drive,
+    GoalDisc,
+    Movables,
+    RobotModel,
+    StaticMap,
+    World,
+    load_world,
+    save_world,
+)
 
 COMMANDS = (
     "run",
@@ -140,6 +150,59 @@ def test_plan_writes_a_plan(room: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert len(poses) == len(data["plan"]["times"])
     assert poses[0] == pytest.approx([2.0, 2.0, 0.0])
     assert np.hypot(*(poses[-1, :2] - [10.0, 3.0])) <= 1.0 + 1e-6
+
+
+OWN = """
+import numpy as np
+from pushplan.world import Plan, PlanResult, PlanStats, PlanStatus
+
+
+class Own:
+    def __init__(self, *corners):
+        self.corners = corners
+
+    def plan(self, world, *, stop=None, rng=None):
+        poses = np.array([(x, y, 0.0) for x, y in self.corners])
+        count = len(poses)
+        plan = Plan(np.arange(count, dtype=float), poses, np.ones(count), np.zeros(count), 1.0)
+        return PlanResult(PlanStatus.SOLVED, plan, PlanStats(0.0))
+
+
+def elsewhere():
+    return Own((9.0, 9.0), (10.0, 3.0))
+
+
+def through_a_wall():
+    return Own((2.0, 2.0), (2.0, 9.0), (10.0, 3.0))
+
+
+def short():
+    return Own((2.0, 2.0), (3.0, 2.0))
+
+
+def right():
+    return Own((2.0, 2.0), (10.0, 3.0))
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("elsewhere", "plan.poses must begin within"),
+        ("through_a_wall", "says solved, but at [2, "),
+        ("short", "says solved, but the plan ends at [3, 2], short of the goal"),
+        ("right", ""),
+    ],
+)
+def test_a_plan_of_ones_own_is_what_its_status_says(
+    name: str, said: str, room: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    static = StaticMap.build(segments=[[0.0, 6.0, 4.0, 6.0]], radii=0.1, bounds=[0, 0, 12, 12])
+    save_world(replace(load_world(room), static=static), room)
+    own = room.with_name("own.py")
+    own.write_text(OWN)
+    assert main(["plan", str(room), "--planner", f"{own}:{name}"]) == (1 if said else 0)
+    assert said in (one_line(capsys) if said else "")
 
 
 def test_errors_are_one_line_with_a_code(

@@ -70,7 +70,7 @@ class PlanRequest:
         result = replace(result, stats=replace(result.stats, wall_time_s=took))
         if result.plan is None:
             return Answer(result)
-        _check(result.plan, self.start)
+        check_plan(result.plan, self.start)
         plan = joined(self.stretch, result.plan)
         if self.comparison is None:
             return Answer(result, plan)
@@ -108,8 +108,12 @@ def without_predictions(result: PlanResult) -> PlanResult:
     return replace(result, plan=replace(result.plan, object_poses=None))
 
 
-def _check(plan: Plan, start: World) -> None:
-    """Refuse a plan that is not one for this snapshot."""
+def check_plan(plan: Plan, start: World) -> None:
+    """Refuse a plan that is not one for this snapshot.
+
+    Raises:
+        InvalidInputError: if it begins elsewhere, or predicts other objects.
+    """
     (x, y) = plan.poses[0, :2].tolist()
     (x0, y0) = start.robot_pose[:2].tolist()
     most = start.robot.circumscribed_radius
