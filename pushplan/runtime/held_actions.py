@@ -139,6 +139,8 @@ def drivable(policy: object, hold: float, contact: ContactParameters | None = No
         policy = make_policy(word("policy with contact", policy), interaction=contact.model())
     if isinstance(policy, str):
         policy = make_policy(policy)
+    if isinstance(policy, type):
+        raise InvalidInputError(f"policy must be an object, got the class {policy.__name__}")
     if isinstance(policy, Planner) and not isinstance(policy, Policy):
         policy = policy_for(policy)
     if not isinstance(policy, Policy):

@@ -12,7 +12,7 @@ import numpy as np
 
 from pushplan.errors import InvalidInputError
 from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, Shape
-from pushplan.world.checks import ArrayRecord, FloatArray, frozen
+from pushplan.world.checks import ArrayRecord, FloatArray, expect, frozen
 from pushplan.world.polyline import arc_lengths, path_length
 
 if TYPE_CHECKING:
@@ -182,6 +182,7 @@ class PlanResult:
     stats: PlanStats
 
     def __post_init__(self) -> None:
+        expect("status of a result", self.status, PlanStatus)
         if (self.plan is not None) != self.status.has_plan:
             raise InvalidInputError(
                 f"a result with status {self.status.label} must "

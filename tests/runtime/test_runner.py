@@ -111,6 +111,11 @@ def test_a_planner_by_name_brings_the_robot_to_its_goal_past_boxes():
     assert commands[-1].plan is not None
 
 
+def test_a_class_in_place_of_an_object_is_refused():
+    with pytest.raises(InvalidInputError, match="must be an object, got the class Straight"):
+        Runner(Straight, period=PERIOD)
+
+
 def test_a_planner_that_raises_stops_the_robot_with_a_reason_and_is_asked_again():
     planner = Straight()
     world = maze()
