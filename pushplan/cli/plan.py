@@ -82,10 +82,10 @@ def _objection(world: World, result: PlanResult) -> str | None:
         return None
     if (blocked := blocked_pose(world, plan.poses)) is not None:
         x, y, _ = blocked.tolist()
-        return f"at [{x:.6g}, {y:.6g}] the robot touches something static: path_only says so"
+        return f"at [{x:.6g}, {y:.6g}] the robot touches something static: that is path_only"
     if world.goal_kind == "robot" and not world.navigation_goal.reached_by(plan.poses[-1]):
         x, y, _ = plan.poses[-1].tolist()
-        return f"the plan ends at [{x:.6g}, {y:.6g}], short of the goal: approximate says so"
+        return f"the plan ends at [{x:.6g}, {y:.6g}], short of the goal: that is approximate"
     return None
 
 

@@ -173,7 +173,7 @@ def stress(
     scenarios = chosen.scenarios
     if not scenarios:
         raise InvalidInputError("a stress test needs at least one scenario")
-    sensed = any(one.variations.get("sensing", "full") != "full" for one in scenarios)
+    sensed = all(one.variations.get("sensing", "full") != "full" for one in scenarios)
     wanted = _conditions(conditions, sensed)
     spec = parse_policy(policy)
     misfits([spec], [chosen], JobSettings())
@@ -189,7 +189,8 @@ def stress(
             make = partial(_disturbed, spec, condition.disturbances, period, planning_time, noise)
             varied = replace(scenario, variations=Variations(variations))
             jobs.append(Job(PolicySpec(label, make), varied))
-        JobSettings().environment(varied, None).close()
+    for job in {job.scene: job for job in jobs}.values():
+        JobSettings().environment(job.scenario, None).close()
     jobs.sort(key=lambda job: job.key[2])  # a test that is cut short still compares conditions
     with tempfile.TemporaryDirectory(prefix="pushplan-") as temporary:
         rows = run_batch(

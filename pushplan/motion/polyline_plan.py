@@ -84,8 +84,10 @@ def blocked_pose(world: World, poses: FloatArray) -> FloatArray | None:
     where it touches nothing.
     """
     moves = np.diff(poses, axis=0)
-    step = _FINE * world.robot.circumscribed_radius
-    counts = np.maximum(np.ceil(np.hypot(moves[:, 0], moves[:, 1]) / step), 1.0).astype(np.int64)
+    moves[:, 2] = wrap_angle(moves[:, 2])
+    size = world.robot.circumscribed_radius
+    ways = np.maximum(np.hypot(moves[:, 0], moves[:, 1]), size * np.abs(moves[:, 2]))
+    counts = np.maximum(np.ceil(ways / (_FINE * size)), 1.0).astype(np.int64)
     first = np.repeat(np.arange(len(moves)), counts)
     begins = np.cumsum(counts) - counts
     fraction = (np.arange(len(first)) - begins[first]) / counts[first]

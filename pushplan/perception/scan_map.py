@@ -75,8 +75,8 @@ class ScanMap:
         columns, rows = (math.ceil(side - 1e-9) for side in sides)
         self.log_odds = np.zeros((rows, columns))
         self._occupied = np.zeros((rows, columns), dtype=np.bool_)
+        self._hit = np.zeros((rows, columns), dtype=np.bool_)
         self._since = np.zeros((rows, columns))
-        self._time = -math.inf
         self._solid = np.zeros((rows, columns), dtype=np.bool_)
         self._unseen: BoolArray = frozen(np.ones((rows, columns), dtype=np.bool_))
         self._changed = _Window(rows, columns)
@@ -96,11 +96,11 @@ class ScanMap:
             scan: what the sensor saw.
             ignored: (N,) beams that have hit something that belongs to no map.
         """
-        self._time = max(self._time, expect("scan", scan, LidarScan).time)
+        expect("scan", scan, LidarScan)
         ignored = np.asarray(ignored)
         if ignored.shape != scan.ranges.shape or ignored.dtype != np.bool_:
             raise InvalidInputError(
-                f"ignored must be {len(scan.ranges)} truths, one a beam, got {short(ignored)}"
+                f"ignored must be {len(scan.ranges)} booleans, one a beam, got {short(ignored)}"
             )
         row, column = ((scan.pose[1::-1] - self.origin[::-1]) / self.cell).tolist()
         if not (0.0 <= row <= len(self.log_odds) and 0.0 <= column <= self.log_odds.shape[1]):
@@ -117,6 +117,9 @@ class ScanMap:
         place = left, low, self.cell, x, y
         window = core.mark_scan(self.log_odds, *place, *beams, _EVIDENCE, averaged)
         part = self._changed.include(*window)
+        hit = self.log_odds[part] > 0.0
+        self._since[part][hit & ~self._hit[part]] = scan.time
+        self._hit[part] = hit
         hidden = self.log_odds[part] == 0.0
         if not np.array_equal(hidden, self._unseen[part]):
             unseen = self._unseen.copy()
@@ -124,17 +127,17 @@ class ScanMap:
             self._unseen = frozen(unseen)
 
     def clear(self, shapes: NDArray[Any], rim: float, near: FloatArray, since: FloatArray) -> None:
-        """Hold the cells in polygons of Shapely (K,) for free, where they are held for occupied.
+        """Hold the cells of objects for free, where they are held for occupied.
 
-        Cells of which the map is sure are walls that a polygon touches, unless they are well inside
-        it, or where it is exact were not occupied before a time.
+        Cells that few beams have hit are free up to the rim. Where the map is sure, cells that were
+        occupied before an object was last seen are walls which it touches, unless they are well
+        inside it.
 
         Args:
-            shapes: the polygons.
-            rim: how far around them cells are cleared [m].
-            near: (K,) how inexact they are [m]: cells of which the map is not sure are cleared
-                that much farther, others that far inside.
-            since: (K,) that time [s].
+            shapes: polygons of Shapely (K,), where the objects are.
+            rim: distance around them in which a cell is theirs [m].
+            near: (K,) by how much they may be elsewhere [m].
+            since: (K,) when each object was last seen [s].
         """
         wide = rim + near
         corners = (shapely.bounds(shapes).reshape(-1, 2, 2) - self.origin) / self.cell
@@ -148,12 +151,12 @@ class ScanMap:
             rows, columns = np.nonzero(part > 0.0)
             x, y = self.origin[:, None] + self.cell * (np.array([columns + c0, rows + r0]) + 0.5)
             sure = part[rows, columns] >= _EVIDENCE[3]
-            new = ~self._occupied[r0:r1, c0:c1] | (self._since[r0:r1, c0:c1] > since[k])
-            new &= near[k] == 0.0
-            reach = np.where(sure, rim, wide[k])
-            cleared = shapely.dwithin(shapes[k], shapely.points(x, y), reach)
-            inside = shapely.buffer(shapes[k], -max(near[k], _DEEP * self.cell))
-            cleared &= ~sure | new[rows, columns] | shapely.contains_xy(inside, x, y)
+            new = self._since[rows + r0, columns + c0] > since[k]
+            within = [
+                shapely.contains_xy(shapely.buffer(shapes[k], by), x, y)
+                for by in (rim + near[k], rim - near[k], -max(near[k], _DEEP * self.cell))
+            ]
+            cleared = np.where(sure, np.where(new, within[1], within[2]), within[0])
             part[rows[cleared], columns[cleared]] = _EVIDENCE[2]
             self._changed.include(r0, c0, r1, c1)
 
@@ -169,9 +172,7 @@ class ScanMap:
         choice("treatment of unknown cells", unknown, UNKNOWN)
         part = self._changed.taken()
         odds = self.log_odds[part]
-        occupied = (odds > 0.0) | (self._occupied[part] & (odds > _GONE))
-        self._since[part][occupied & ~self._occupied[part]] = self._time
-        self._occupied[part] = occupied
+        self._occupied[part] = (odds > 0.0) | (self._occupied[part] & (odds > _GONE))
         closed = unknown == "obstacle"
         if closed or self._closed:
             part = np.s_[:, :]

@@ -25,6 +25,7 @@ _RIM = 1.5  # cells around an object in which a beam that meets it is taken to h
 _MEETS = 0.5  # cells within which a beam meets an object, or a cell of the map is of the object
 _INEXACT = 0.75  # cells by which a wall may stand nearer than the map has it
 _INTO = 2.0  # cells that most beams which would hit an object have to reach into it: it is gone
+_PUSHED = 1.5  # distance up to which the robot may have pushed an object [circumscribed radii]
 _MOST_CELLS = 4e6  # of a map whose cells nobody has chosen
 
 
@@ -180,8 +181,11 @@ class WorldEstimate:
             one = objects.select([k])
             begins, ends = _crossed(one, scan)
             met = np.isfinite(ends) & (seen > 0.0)
-            least = begins + _INTO * self.map.cell + float(self._near(one)[0])
-            beyond = met & (seen > np.maximum(least, 0.5 * (begins + ends)))
+            into = _INTO * self.map.cell + float(self._near(one)[0])
+            least = np.maximum(begins + into, 0.5 * (begins + ends))
+            if away[k] < objects.radii[k] + _PUSHED * self._robot.circumscribed_radius:
+                least = ends + into  # the robot may have pushed it since it was seen
+            beyond = met & (seen > least)
             if met.any() and 2 * beyond.sum() > met.sum():
                 missed.append(k)
         if missed:

@@ -14,7 +14,7 @@ from pushplan.envs.tasks.room import SMALL_ROOM
 from pushplan.evaluation import Experiment, Results, bench, compare_runs, verify
 from pushplan.evaluation.benchmark import suites_of
 from pushplan.scenarios import Scenario, Suite, load_scenarios, save_scenarios, suite, world_suite
-from pushplan.world import InvalidInputError, SchemaError, load_world, save_world
+from pushplan.world import ClearanceArea, InvalidInputError, SchemaError, load_world, save_world
 
 pytestmark = pytest.mark.usefixtures("empty_figures")
 
@@ -85,7 +85,21 @@ def test_a_world_that_nobody_could_drive_in_is_refused_before_anything_runs(
     assert said in capsys.readouterr().err and not (out / "results.csv").exists()
 
 
+def test_worlds_of_one_name_are_looked_at_one_by_one(tmp_path: Path) -> None:
+    folder_of(tmp_path / "a", "x.yaml")
+    folder_of(tmp_path / "b", "x.yaml")
+    world = load_world(tmp_path / "b" / "x.yaml")
+    corners = [(0.1, 0.1), (0.5, 0.1), (0.5, 0.5), (0.1, 0.5)]
+    area = ClearanceArea(corners, [True] * 4)
+    save_world(replace(world, goal=area), tmp_path / "b" / "x.yaml")
+    for order in (["a", "b"], ["b", "a"]):
+        suites = [{"worlds": name, "label": name} for name in order]
+        found = experiment(tmp_path, *suites)
+        assert set(found.skipped) == {("b", "straight")}
+
+
 def test_the_same_drive_again_and_again_counts_once_in_a_test(tmp_path: Path) -> None:
+    """In the two worlds both policies drive alike too, and these are two."""
     folder_of(tmp_path / "kitchens", "a.yaml", "b.yaml")
     given = {"worlds": "kitchens", "episodes": 3}
     results = experiment(tmp_path, given, policies=["straight", "other=straight"]).run(workers=0)

@@ -11,6 +11,7 @@ from conftest import leave_figures_empty
 
 from pushplan.cli import main
 from pushplan.evaluation import ResultRow, Results, bench
+from pushplan.evaluation.statistics.summary import paired_differences
 from pushplan.evaluation.store.run_directory import RunDirectory
 from pushplan.world import InvalidInputError
 
@@ -45,6 +46,13 @@ def rows_of(policy: str, shift: float, seeds: int = 20, setting: str = "maze-5")
         )
         for seed in range(seeds)
     ]
+
+
+def test_layouts_in_which_policies_drive_alike_by_chance_all_count() -> None:
+    """No box was in the way, so that all drives are the same."""
+    rows = [*rows_of("plain", 0.0), *rows_of("better", 0.1)]
+    same = [replace(row, metrics=rows[0].metrics) for row in rows]
+    assert {pair.difference.count for pair in paired_differences(same)} == {20}
 
 
 @pytest.fixture

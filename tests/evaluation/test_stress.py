@@ -7,10 +7,10 @@ from dataclasses import replace
 import pytest
 
 from pushplan.envs import make
-from pushplan.evaluation import Condition, stress
+from pushplan.evaluation import Condition, stress, stress_testing
 from pushplan.evaluation.stress_testing import CONDITIONS, UNDISTURBED
 from pushplan.runtime.disturbances import Disturbances
-from pushplan.scenarios import suite
+from pushplan.scenarios import Scenario, suite
 from pushplan.world import InvalidInputError, Twist, UnknownNameError
 
 
@@ -75,6 +75,24 @@ def test_conditions_of_sensors_change_what_a_robot_with_sensors_sees():
     assert [row.condition for row in sheet.rows] == [UNDISTURBED, *wanted]
     lengths = {row.condition: row.scores["E_nav"] for row in sheet.rows}
     assert len(set(lengths.values())) == 4 and not any("wall" in row.ends for row in sheet.rows)
+
+
+def test_by_default_sensors_are_disturbed_only_where_every_robot_has_some(monkeypatch):
+    ran = []
+
+    def stopped(jobs, **options):
+        ran.extend(jobs)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(stress_testing, "run_batch", stopped)
+    starts = [
+        Scenario("maze", variations={"boxes": 1, "sensing": one}) for one in ("lidar", "full")
+    ]
+    with pytest.raises(KeyboardInterrupt):
+        stress("straight", starts, workers=0)
+    assert {job.policy.label for job in ran} == {
+        name for name, one in CONDITIONS.items() if not one.of_sensors
+    }
 
 
 def test_a_policy_is_told_the_noise_of_sensors():

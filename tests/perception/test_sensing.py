@@ -315,6 +315,42 @@ class TestWorldEstimate:
         face = shapely.LineString([(1.525, -0.8), (1.525, 0.8)])
         assert walls.buffer(1e-6).intersection(face).length > 0.98 * face.length
 
+    @pytest.mark.parametrize("noise", [0.0, 1e-9, 0.001])
+    def test_what_was_hit_of_an_object_before_it_was_detected_is_none(self, noise):
+        """Its sides were walls for many scans; it is less than three cells wide."""
+        belief = estimate(position_noise=noise)
+        small = Movables.from_outlines([0.35 * BOX], [(1.2, 0.0, 0.4)])
+        for time in range(6):
+            there = replace(hall(at=(-0.1 * time, 0.3 * time, 0.0), time=time), movables=small)
+            belief.add_scan(Lidar().scan(there))
+        assert len(look(belief, replace(there, time=7.0)).static.polygons) > 0
+        world = belief.world(there.robot_pose, None, 7.0)
+        corners = world.static.packed[0]
+        assert (np.hypot(*(corners - [1.2, 0.0]).T) > 0.5).all()
+
+    def test_it_does_not_matter_how_often_the_world_is_asked_for(self):
+        maps = []
+        for asked in (False, True):
+            belief = estimate()
+            wall_of = [wall(1.5, -1.0, 1.7, 1.0)]
+            for time in range(20):
+                boxes = [] if time < 4 else [(1.32, -0.5 + 0.03 * time, 0.0)]
+                there = hall(boxes, wall_of, time=time)
+                belief.add_detections(Detector().detect(there))
+                belief.add_scan(Lidar().scan(there))
+                if asked:
+                    belief.world(there.robot_pose, None, time)
+            maps.append(belief.map.log_odds.copy())
+        np.testing.assert_array_equal(*maps)
+
+    def test_an_object_that_the_robot_has_pushed_is_not_forgotten(self):
+        """A scan sees it elsewhere before the detector does."""
+        belief = estimate()
+        at = (0.75 - ROBOT.vertices[:, 0].max(), 0.0, 0.0)
+        look(belief, hall([(1.0, 0.0, 0.0)], at=at))
+        belief.add_scan(Lidar().scan(hall([(1.3, 0.0, 0.0)], at=at, time=1.0)))
+        assert len(belief.objects) == 1
+
     def test_a_wall_beside_an_object_is_drawn(self):
         """The box hides none of it, and is a centimetre away."""
         belief = estimate()
@@ -348,7 +384,7 @@ class TestWorldEstimate:
         far = LidarScan(0.0, (2.0, -9.0, math.pi / 2), [-0.3, 0.3], [3.0, 8.0], 10.0)
         chart.add(far, np.zeros(2, dtype=bool))
         assert chart.unseen.all() and not chart.static_map().polygons
-        with pytest.raises(InvalidInputError, match="ignored must be 2 truths"):
+        with pytest.raises(InvalidInputError, match="ignored must be 2 booleans"):
             chart.add(far, np.zeros(3, dtype=bool))
         with pytest.raises(InvalidInputError, match="unknown cells"):
             chart.static_map(unknown="blocked")

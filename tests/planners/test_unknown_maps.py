@@ -183,6 +183,8 @@ def test_an_area_that_is_not_seen_is_not_done(policy):
         unseen=Unseen(np.ones((20, 20), dtype=bool), 0.1, np.zeros(2)),
     )
     assert not world.goal_reached and replace(world, unseen=None).goal_reached
+    seen = Unseen(np.zeros((20, 20), dtype=bool), 0.1, np.zeros(2))
+    assert replace(world, unseen=seen).goal_reached
     with Runner(policy, period=0.1) as runner:
         command = runner.start(world)
         for step in range(1, 8):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -55,38 +54,33 @@ def misfits(
     worlds: dict[tuple[str, str], World] = {}
     made: set[str] = set()
     starts = {
-        suite.name: {Job(specs[0], scenario).title: scenario for scenario in suite.scenarios}
+        suite.name: {(job := Job(specs[0], one)).scene: job for one in suite.scenarios}
         for suite in suites
     }
     for spec in specs:
         first = ""
         wanted = [one for one in suites if is_wanted(spec, one, only or {})]
         for suite in wanted:
-            for title, scenario in starts[suite.name].items():
-                if (spec.label, title) not in known:
-                    known[spec.label, title] = incompatibility(spec, scenario, settings, worlds)
-                if (reason := known[spec.label, title]) is None:
-                    made.add(_scene(scenario))
+            for scene, job in starts[suite.name].items():
+                if (spec.label, scene) not in known:
+                    known[spec.label, scene] = incompatibility(spec, job.scenario, settings, worlds)
+                if (reason := known[spec.label, scene]) is None:
+                    made.add(scene)
                     found.pop((suite.name, spec.label), None)
                     break
                 found[suite.name, spec.label] = reason
-                first = first or f"{title}: {reason}"
+                first = first or f"{job.title}: {reason}"
         if not allow_all and first and all((suite.name, spec.label) in found for suite in wanted):
             raise UnusablePolicyError(f"policy {spec.label!r} cannot run {first}")
     for suite in suites:
-        if all((suite.name, spec.label) in found for spec in specs):
+        wanted_by = [spec for spec in specs if is_wanted(spec, suite, only or {})]
+        if all((suite.name, spec.label) in found for spec in wanted_by):
             continue
-        for scenario in suite.scenarios:
-            if (scene := _scene(scenario)) not in made:  # such as another world
+        for scene, job in starts[suite.name].items():
+            if scene not in made:  # such as another world
                 made.add(scene)
-                settings.environment(scenario, None).close()
+                settings.environment(job.scenario, None).close()
     return found
-
-
-def _scene(scenario: Any) -> str:
-    """Text that is the same for scenarios whose environments are alike."""
-    of = (scenario.task, scenario.simulator, scenario.preset, dict(scenario.variations))
-    return json.dumps(of, sort_keys=True)
 
 
 def is_wanted(spec: PolicySpec, suite: Suite, only: Mapping[str, Sequence[str]]) -> bool:

@@ -162,7 +162,7 @@ def _execute(job: Job, settings: JobSettings) -> JobResult:
 
 def dry_run(job: Job, settings: JobSettings) -> None:
     """Load what a job needs; what goes wrong here goes wrong again in the job."""
-    what = (job.policy.label, job.policy.identity, job.title)
+    what = (job.policy.label, job.policy.identity, job.scene)
     if what in _dry_runs:
         return
     _dry_runs.add(what)

@@ -59,6 +59,12 @@ class Job:
         return "" if self.spec is None else job_id(self.spec)
 
     @property
+    def scene(self) -> str:
+        """Text that is the same for scenarios whose environments are alike, whatever the seed."""
+        data = {**self.scenario.to_dict(), "seed": 0, "name": ""}
+        return json.dumps(data, sort_keys=True, default=repr)
+
+    @property
     def title(self) -> str:
         """The scenario without its seed, in words."""
         data = self.scenario.to_dict()

@@ -20,7 +20,7 @@ from pushplan.evaluation.statistics.estimates import (
     signed_rank_test,
     wilson,
 )
-from pushplan.evaluation.store.rows import ResultRow, setting_of
+from pushplan.evaluation.store.rows import ResultRow
 from pushplan.metrics import METRICS, Role, metric_names
 from pushplan.world.checks import FloatArray, choice
 
@@ -34,6 +34,9 @@ TIMINGS = (
     "decision_time_max_s",
     "wall_time_s",
 )
+
+_WORLDS = "room"
+"""Task of the worlds of files."""
 
 
 @dataclass(frozen=True)
@@ -138,7 +141,7 @@ def paired_differences(
 
     Metrics of which neither direction is better are left out. Path and work are compared where
     both succeed: who fails has driven and pushed less. Scenarios in which both drive just as in
-    another one, as in a world without spread, count once.
+    another run of the same world file, as without spread, count once.
 
     Args:
         rows: of a run.
@@ -213,10 +216,13 @@ def values_of(rows: Sequence[ResultRow], metric: str) -> list[float]:
 
 
 def _drive(row: ResultRow) -> object:
-    """Value that is the same for two rows of a policy that drove alike, to the last digit."""
-    if row.failed or not row.metrics.get("path_length_m"):
+    """Value that is the same for two rows of a policy that drove alike in one world of a user.
+
+    Elsewhere the seed decides the layout, and two drives through it may be alike by chance.
+    """
+    if row.failed or row.task != _WORLDS or not row.metrics.get("path_length_m"):
         return (row.scenario, row.seed)
-    return (setting_of(row.scenario, row.seed), row.reason, *sorted(row.metrics.items()))
+    return (row.scenario.removesuffix(f"-{row.seed}"), row.reason, *sorted(row.metrics.items()))
 
 
 def by_scenario(rows: Sequence[ResultRow], metric: str) -> dict[tuple[str, int], float]:

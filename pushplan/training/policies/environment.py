@@ -34,6 +34,7 @@ class _Blank:
         self.dtype = builder.dtype
         self.low = builder.low
         self.high = builder.high
+        self.beams = getattr(builder, "beams", 0)  # of the lidar of the environment
         self._nothing = np.zeros(self.shape, self.dtype)
 
     def observe(self, world: World) -> NDArray[Any]:
