@@ -118,7 +118,9 @@ class ScanMap:
         window = core.mark_scan(self.log_odds, *place, *beams, _EVIDENCE, averaged)
         part = self._changed.include(*window)
         hit = self.log_odds[part] > 0.0
-        self._since[part][hit & ~self._hit[part]] = scan.time
+        fresh = hit > self._hit[part]
+        if fresh.any():
+            self._since[part][fresh] = scan.time
         self._hit[part] = hit
         hidden = self.log_odds[part] == 0.0
         if not np.array_equal(hidden, self._unseen[part]):
