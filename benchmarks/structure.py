@@ -3,20 +3,28 @@
     python -m benchmarks.structure [PACKAGE_FOLDER ...] [--check]
 
 Reads source code only. Given the folders of two versions it prints a column for each. With
-``--check`` it fails where a figure is above its limit in ``reference/structure.yaml``, which may
-only be lowered; the package may have more syntax nodes if a line of the changelog that begins with
-*Size:* says why. A *node* is one of Python's syntax tree: neither comments nor the layout of lines
-change their number. A *name
-imported between families* is one name in an import statement from one planner family in another;
-files directly in ``planners/`` are the room's doors and belong to no family. A *circle* is a set of
-modules that import each other in a loop, imports inside functions counted too. A
-conditional expression is *long* if it holds another one, spans lines or has over 60 characters.
+``--check`` it fails where a figure is above its limit in ``reference/structure.yaml``, and where a
+limit is higher than in any earlier commit. The *lines of the package* are those of all files that
+git does not ignore: Python, stubs, tables and page files in ``pushplan/``, C++ and bindings in
+``core/`` without its tests. ``later rises`` in that file are lines that planned features may still
+take: a feature moves its entry into ``lines of the package``, so that the sum never grows.
+
+A *node* is one of Python's syntax tree: neither comments nor the layout of lines change their
+number. A *name imported between families* is one name in an import statement from one planner
+family in another; files directly in ``planners/`` are the room's doors and belong to no family. A
+*circle* is a set of modules that import each other in a loop, imports inside functions counted too.
+A conditional expression is *long* if it holds another one, spans lines or has over 60 characters.
+*Public names* are classes and functions at the top of modules; *numeric constants* are assignments
+of numbers, or of arithmetic on numbers, there.
 """
 
 from __future__ import annotations
 
 import ast
+import io
 import re
+import subprocess
+import tokenize
 import tomllib
 from collections import Counter
 from collections.abc import Iterator
@@ -33,6 +41,17 @@ LONGEST_CHOICE = 60
 """Characters of a conditional expression that is read at a glance."""
 ROOT = Path(__file__).resolve().parent.parent
 LIMITS = ROOT / "benchmarks" / "reference" / "structure.yaml"
+TOTAL = "lines of the package"
+COUNTED = {
+    "pushplan": ("py", "pyi", "toml", "yaml", "yml", "json", "js", "css", "html"),
+    "core": ("cpp", "hpp", "c", "h"),
+}
+"""Endings of the files whose lines make up the total, by folder."""
+PREPOSITIONS = (
+    "of for from until by in on at to with without over under after before whose that which"
+)
+NUMBERS = (ast.Constant, ast.UnaryOp, ast.BinOp, ast.operator, ast.unaryop)
+"""Kinds of nodes in a value that is made of numbers alone."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +59,13 @@ class Module:
     """One source file, read."""
 
     name: str
-    lines: int
+    text: str
     tree: ast.Module
+
+    @property
+    def lines(self) -> int:
+        """Lines of the file."""
+        return self.text.count("\n")
 
     @property
     def nodes(self) -> int:
@@ -65,7 +89,7 @@ def read(folder: Path) -> list[Module]:
         if package and parts[1:2] == ("planners",) and len(parts) == 4:
             name += ".__init__"  # the face of a family belongs to it
         text = file.read_text()
-        found.append(Module(name, text.count("\n"), ast.parse(text)))
+        found.append(Module(name, text, ast.parse(text)))
     return found
 
 
@@ -167,10 +191,62 @@ def _options(value: Any) -> int:
     return sum(map(_options, value)) if isinstance(value, list) else 0
 
 
-def lines_of_core(folder: Path) -> int:
-    """Lines of the C++ core and its bindings; none where the package has none."""
-    files = [*folder.rglob("*.hpp"), *folder.rglob("*.cpp")]
-    return sum(len(file.read_text().splitlines()) for file in files if "tests" not in file.parts)
+def git(folder: Path, *arguments: str) -> str:
+    """Output of a command of git in a folder.
+
+    Raises:
+        SystemExit: if git fails there, with what it says.
+    """
+    done = subprocess.run(["git", *arguments], cwd=folder, capture_output=True, text=True)
+    if done.returncode:
+        raise SystemExit(f"lines and limits are compared by git: {done.stderr.strip()}")
+    return done.stdout
+
+
+def package_lines(top: Path) -> int:
+    """Lines of the package and its core in all languages, of files that git does not ignore."""
+    total = 0
+    for folder, endings in COUNTED.items():
+        names = git(top, "ls-files", "-z", "--cached", "--others", "--exclude-standard", folder)
+        for name in set(names.split("\0")) - {""}:
+            file = top / name
+            counted = file.suffix[1:] in endings and not name.startswith("core/tests/")
+            if counted and file.is_file():
+                total += file.read_bytes().count(b"\n")
+    return total
+
+
+def numeric_constants(module: Module) -> int:
+    """Assignments of numbers at the top of a module."""
+    return sum(
+        isinstance(line, ast.Assign | ast.AnnAssign)
+        and line.value is not None
+        and all(
+            isinstance(node, NUMBERS)
+            and isinstance(getattr(node, "value", 0), int | float)
+            and not isinstance(getattr(node, "value", 0), bool)
+            for node in ast.walk(line.value)
+        )
+        for line in module.tree.body
+    )
+
+
+def public_names(module: Module) -> int:
+    """Classes and functions at the top of a module whose names do not begin with an underscore."""
+    kinds = ast.ClassDef | ast.FunctionDef
+    return sum(isinstance(line, kinds) and line.name[0] != "_" for line in module.tree.body)
+
+
+def hanging_comments(module: Module) -> int:
+    """Comments that begin with a preposition or a relative, so that they hang on the code."""
+    hanging = re.compile(rf"#\s*({PREPOSITIONS.replace(' ', '|')})\b")
+    tokens = tokenize.generate_tokens(io.StringIO(module.text).readline)
+    return sum(one.type == tokenize.COMMENT and bool(hanging.match(one.string)) for one in tokens)
+
+
+def python_lines(folder: Path) -> str:
+    """Lines of all Python files below a folder."""
+    return str(sum(file.read_bytes().count(b"\n") for file in folder.rglob("*.py")))
 
 
 def measure(folder: Path) -> tuple[dict[str, str], list[str]]:
@@ -186,9 +262,14 @@ def measure(folder: Path) -> tuple[dict[str, str], list[str]]:
         rooms[room] += module.lines
         nodes[room] += module.nodes
     figures = {
+        TOTAL: str(package_lines(folder.parent)),
         "syntax nodes": str(nodes.total()),
-        "lines": str(sum(module.lines for module in modules)),
-        "lines of C++": str(lines_of_core(folder.parent / "core")),
+        "lines of Python": str(rooms.total()),
+        "lines of tests": python_lines(folder.parent / "tests"),
+        "lines of benchmarks": python_lines(folder.parent / "benchmarks"),
+        "numeric constants": str(sum(map(numeric_constants, modules))),
+        "public names": str(sum(map(public_names, modules))),
+        "comments that begin with a preposition": str(sum(map(hanging_comments, modules))),
         "files": str(len(modules)),
         "longest file": str(max(module.lines for module in modules)),
         "files over 300 lines": str(sum(module.lines > 300 for module in modules)),
@@ -205,22 +286,38 @@ def measure(folder: Path) -> tuple[dict[str, str], list[str]]:
     return figures, [*words, *("circle: " + ", ".join(loop) for loop in loops)]
 
 
+def limits_of(text: str) -> dict[str, int]:
+    """Limits of a file of them by name; that of the total with the rises that may still follow."""
+    read = yaml.safe_load(text)
+    limits = {name: rule["most"] for name, rule in read["mechanisms"].items()} | read["most"]
+    limits["the total with its later rises"] = limits[TOTAL] + sum(read["later rises"].values())
+    return limits
+
+
+def raised_limits() -> list[str]:
+    """Limits that are higher than in an earlier commit, or that are gone."""
+    if git(ROOT, "rev-parse", "--is-shallow-repository").strip() == "true":
+        return ["earlier limits are not known: fetch the whole history (git fetch --unshallow)"]
+    file = LIMITS.relative_to(ROOT).as_posix()
+    now = limits_of(LIMITS.read_text())
+    found = set()
+    for commit in git(ROOT, "log", "--format=%H", "--", file).split():
+        text = git(ROOT, "show", f"{commit}:{file}")
+        if TOTAL not in text:  # limits could be waived up to version 0.3.0
+            continue
+        for name, limit in limits_of(text).items():
+            if name != TOTAL and now.get(name, limit + 1) > limit:
+                found.add(f"the limit of {name}: {now.get(name, 'gone')}, it was {limit}")
+    return sorted(found)
+
+
 def breaches(figures: dict[str, str]) -> list[str]:
-    """Figures above their limits, and limits that can be lowered."""
-    limits = yaml.safe_load(LIMITS.read_text())
-    most = {name: rule["most"] for name, rule in limits["mechanisms"].items()} | limits["most"]
-    found = []
-    for name, limit in most.items():
-        value = int(figures[name])
-        if value > limit and not (name == "syntax nodes" and _growth_is_explained()):
-            found.append(f"{name}: {value}, at most {limit}")
+    """Figures above their limits, and limits that were raised."""
+    found = raised_limits()
+    for name, limit in limits_of(LIMITS.read_text()).items():
+        if name in figures and int(figures[name]) > limit:
+            found.append(f"{name}: {figures[name]}, at most {limit}")
     return found
-
-
-def _growth_is_explained() -> bool:
-    """True if the changelog of the next version says why the package has grown."""
-    unreleased = (ROOT / "CHANGELOG.md").read_text().split("\n## ")[1]
-    return re.search(r"^- Size: .{20,}", unreleased, re.MULTILINE) is not None
 
 
 def main() -> int:
@@ -240,7 +337,8 @@ def main() -> int:
             f"\n{folder}:", *(words or ["nothing crosses between families, no circles"]), sep="\n  "
         )
     broken = breaches(measured[-1][0]) if options.check else []
-    print(*(f"above its limit: {line}" for line in broken), sep="\n", end="\n" if broken else "")
+    for line in broken:
+        print(f"above its limit: {line}")
     return 1 if broken else 0
 
 
