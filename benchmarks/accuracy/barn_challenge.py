@@ -10,7 +10,8 @@ distances and a tenth of its beams missing.
 The score of a world is success times the optimal time over the time taken, which counts as 2 to 8
 times the optimal one (Xiao et al., "Autonomous Ground Navigation in Highly Constrained Spaces",
 2022): 0.5 at most. The optimal time is that of the reference path at 2 m/s; the goal is reached
-within 1 m of it, and touching a cylinder, or 100 s, is a failure.
+within 1 m of it, and touching a cylinder, or 100 s, is a failure. Poses are exact and the robot
+accelerates at up to 20 m/s^2, so scores are not those of the challenge, which runs in Gazebo.
 """
 
 from __future__ import annotations

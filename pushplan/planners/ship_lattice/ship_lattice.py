@@ -72,7 +72,7 @@ class ShipLattice:
 
 
 def published() -> ShipLattice:
-    """The planner as published, see `ShipLatticeConfig.published`; the reference."""
+    """The lattice of AUTO-IceNav as Bench-Push uses it, see `ShipLatticeConfig.published`."""
     return ShipLattice(ShipLatticeConfig.published())
 
 

@@ -51,7 +51,7 @@ class ShipLatticeConfig(LatticeConfig):
 
     @classmethod
     def published(cls, **others: Any) -> Self:
-        """The planner of AUTO-IceNav: kinetic-energy cost, no look at the motion."""
+        """AUTO-IceNav's lattice as Bench-Push uses it: kinetic-energy cost, nothing after it."""
         return super().published(
             push_weight=1.0,
             floe_cost="kinetic-energy",

@@ -29,5 +29,5 @@ def ship_lattice_quick(planner: Planner | None = None, stop: Stop | None = None)
 def ship_lattice_published(
     planner: Planner | None = None, stop: Stop | None = None
 ) -> PlanFollower:
-    """The lattice as published, which plans once in Ship-Ice; the reference."""
+    """The lattice of AUTO-IceNav as Bench-Push uses it: one plan, no optimisation."""
     return PlanFollower(planner or published(), replanning=Replanning(never=True), stop=stop)
