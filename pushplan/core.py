@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from pushplan.errors import PushplanError
 
@@ -35,6 +38,7 @@ except ImportError as error:
 __all__ = [
     "COMPILER",
     "SOURCES",
+    "add_audit_hook",
     "cmake_dir",
     "control",
     "envs",
@@ -63,10 +67,24 @@ def is_stale() -> bool:
     }
     if not files:  # an installed package comes without them
         return False
+    options = ("CMakeLists.txt", "core/CMakeLists.txt")
+    files |= {name: top / name for name in options if (top / name).is_file()}
     listing = "".join(
         f"{name} {hashlib.sha256(files[name].read_bytes()).hexdigest()}\n" for name in sorted(files)
     )
     return hashlib.sha256(listing.encode()).hexdigest()[:12] != SOURCES
+
+
+def add_audit_hook(listener: Callable[[str, tuple[Any, ...]], object]) -> None:
+    """Call a function for each audit event of Python that tells what a program reads.
+
+    The hook cannot be removed. It is one in C, which takes much less time than `sys.addaudithook`.
+
+    Args:
+        listener: takes the name of the event and its arguments; the last one that was given.
+    """
+    hook = ctypes.c_void_p(_core.audit_hook(listener))
+    ctypes.pythonapi.PySys_AddAuditHook(hook, None)
 
 
 def cmake_dir() -> Path:
