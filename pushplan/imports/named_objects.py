@@ -6,7 +6,6 @@ import contextlib
 import hashlib
 import importlib
 import importlib.util
-import os
 import sys
 import threading
 from collections.abc import Iterator, Mapping, Set
@@ -18,14 +17,12 @@ from pushplan.errors import (
     MOST_CHOICES,
     InvalidInputError,
     describe,
-    is_a_users,
     short,
     unknown_name_message,
 )
+from pushplan.imports.observed_reads import PREFIX, forget_modules, has_changed, observing
 from pushplan.imports.on_demand import look_up
 
-_imported: dict[str, tuple[str, tuple[int, int]]] = {}
-"""Modules of users that `load_object` has brought along: their files, and versions of these."""
 _folders: list[str] = []
 """Folders of files that were loaded, the latest first: the end of the import path."""
 _loading = threading.RLock()  # one thread runs a file, the others wait for what it makes
@@ -36,8 +33,8 @@ def load_object(spec: str) -> Any:
     """Import what a text names.
 
     A file is imported once a process, and again when its content has changed or that of a local
-    module that it imports, with its folder on the import path, so that it may import its
-    neighbours. Whatever the file raises passes through.
+    module that it imports or of what it reads, with its folder on the import path, so that it may
+    import its neighbours. Whatever the file raises passes through.
 
     Raises:
         InvalidInputError: if the text has no such form, or there is no such file or name.
@@ -51,11 +48,10 @@ def load_object(spec: str) -> Any:
     if where.startswith("pushplan.") and where in sys.modules:  # each score is asked for so
         with contextlib.suppress(AttributeError):
             return getattr(sys.modules[where], name)
-    with _fresh_modules():
-        if where.endswith(".py"):
-            module = _load_file(Path(where))
-        else:
-            module = _load_module(where, spec)
+    if where.endswith(".py"):
+        module = _load_file(Path(where))
+    else:
+        module = _load_module(where, spec)
     if not hasattr(module, name):
         shown = Path(where).name if where.endswith(".py") else where
         raise InvalidInputError(
@@ -111,8 +107,7 @@ def look_up_or_load(kind: str, table: Mapping[str, str], name: object) -> Any:
 
 def names_to_give(file: str, methods: Set[str] = frozenset()) -> str:
     """Say what to give instead of a file alone: what it defines, or classes with such a method."""
-    with _fresh_modules():
-        found = _callables_of(_load_file(Path(file)))
+    found = _callables_of(_load_file(Path(file)))
     if methods:
         found = {name: one for name, one in found.items() if methods & {*dir(one)}}
     named = " or ".join([f"{file}:{name}" for name in found][:MOST_CHOICES])
@@ -128,41 +123,19 @@ def import_path(folder: str | None = None) -> list[str]:
 def _use_folder(folder: str) -> None:
     """Let modules be found in this folder, before those of the same name beside another file."""
     if folder not in import_path() and _folders[:1] != [folder]:
-        _forget_imported()
+        forget_modules()
         sys.path[:] = import_path()
         _folders[:] = [folder, *(one for one in _folders if one != folder)]
         sys.path += _folders
 
 
-def _forget_imported() -> None:
-    for name in _imported:
-        sys.modules.pop(name, None)
-    _imported.clear()
-
-
 @contextlib.contextmanager
 def _fresh_modules() -> Iterator[None]:
-    """Forget what was imported here before and has been edited since; note what is imported."""
-    if any(_version(file) != version for file, version in _imported.values()):
-        _forget_imported()
-    before = dict(sys.modules)
-    try:
+    """Import all of a user's modules again if one, or what they have read, has been edited."""
+    if has_changed():
+        forget_modules()
+    with observing(kept=True):
         yield
-    finally:
-        for name, module in [*sys.modules.items()]:  # a copy: other threads import meanwhile
-            if module is before.get(name):
-                continue
-            file = getattr(module, "__file__", None)
-            if isinstance(file, str) and is_a_users(file):
-                _imported[name] = file, _version(file)
-
-
-def _version(file: str) -> tuple[int, int]:
-    try:
-        found = os.stat(file)
-    except OSError:
-        return 0, 0
-    return found.st_mtime_ns, found.st_size
 
 
 def _callables_of(module: ModuleType) -> dict[str, Any]:
@@ -178,8 +151,10 @@ def _callables_of(module: ModuleType) -> dict[str, Any]:
 
 
 def _load_module(name: str, spec: str) -> ModuleType:
+    is_ours = name.partition(".")[0] == "pushplan"
     try:
-        return importlib.import_module(name)
+        with contextlib.nullcontext() if is_ours else _fresh_modules():
+            return importlib.import_module(name)
     except ModuleNotFoundError as error:
         if error.name is None or not f"{name}.".startswith(f"{error.name}."):
             raise  # the module is there, something that it imports is not
@@ -194,8 +169,8 @@ def _load_file(path: Path) -> ModuleType:
     source = path.read_bytes()
     # files in two folders may share a name, and an edited one is another module
     digest = hashlib.sha256(str(path).encode() + b"\0" + source).hexdigest()[:8]
-    name = f"pushplan_user_{path.stem}_{digest}"
-    with _loading:
+    name = f"{PREFIX}{path.stem}_{digest}"
+    with _loading, _fresh_modules():
         if name in sys.modules:
             return sys.modules[name]
         spec = importlib.util.spec_from_file_location(name, path)

@@ -17,6 +17,7 @@ from pushplan.evaluation.run.execute import execute
 from pushplan.evaluation.run.job_identity import identified
 from pushplan.evaluation.run.job_limits import MEMORY_MB, WORKER_VARIABLE, check_limits
 from pushplan.evaluation.run.jobs import (
+    BatchStoppedError,
     Job,
     JobResult,
     JobSettings,
@@ -157,6 +158,7 @@ class _Batch:
     done: int
     progress: Progress | None
     began: dict[tuple[str, str, int], str] = field(default_factory=dict)
+    read: dict[str, dict[str, str]] = field(default_factory=dict)  # by the jobs of each policy
 
     def run_here(self) -> None:
         """One after the other in this process."""
@@ -223,7 +225,15 @@ class _Batch:
         row = replace(outcome.row, job=job.id, trace="", began=outcome.row.began or began)
         kept = self.traces == "all" or (self.traces == "failures" and not row.success)
         trace = outcome.trace if kept else None
-        row = self.store.add(row, trace, outcome.detail, job.spec)
+        spec = {**(job.spec or {}), **({"read": dict(outcome.read)} if outcome.read else {})}
+        row = self.store.add(row, trace, outcome.detail, spec)
+        known = self.read.setdefault(row.policy, {})
+        for name, digest in outcome.read.items():
+            if known.setdefault(name, digest) != digest:
+                raise BatchStoppedError(
+                    f"{name}, which code of yours reads, has changed while jobs of "
+                    f"{row.policy!r} ran; what was stored is kept, and the same command goes on"
+                )
         self.done += 1
         if self.progress is not None:
             self.progress(self.done, self.total, row)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import importlib
+import os
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import fields, is_dataclass, replace
@@ -12,16 +13,25 @@ from importlib import metadata
 from typing import Any
 
 from pushplan.envs.registry import SIMULATORS, TASKS
-from pushplan.evaluation.run.jobs import BatchStoppedError, Job, JobSettings, job_id
+from pushplan.evaluation.run.job_limits import WORKER_VARIABLE
+from pushplan.evaluation.run.jobs import MOST_READS, BatchStoppedError, Job, JobSettings, job_id
 from pushplan.evaluation.run.policy_specs import PolicySpec, described
+from pushplan.evaluation.run.worker import THREAD_VARIABLES
 from pushplan.evaluation.store.provenance import PACKAGES, versions
-from pushplan.evaluation.store.source_digests import file_digest, source_digest
+from pushplan.evaluation.store.source_digests import (
+    counted,
+    file_digest,
+    read_digests,
+    source_digest,
+)
+from pushplan.imports.observed_reads import Reads
 from pushplan.metrics import METRICS
 from pushplan.planners.registry import PLANNERS, POLICIES
 from pushplan.world import InvalidInputError
 from pushplan.world.stored.robots import robots
 
 _MOST_DIFFERENCES = 4
+_WORKERS_OWN = [f"${name}" for name in (*THREAD_VARIABLES, WORKER_VARIABLE, "PYTHONUNBUFFERED")]
 _OURS = "pushplan."
 
 
@@ -40,14 +50,37 @@ def check_unchanged(job: Job, settings: JobSettings) -> None:
     Raises:
         BatchStoppedError: if they are others.
     """
+    counted.clear()
     if job.spec is None:
         return
     now = job_spec(job, settings)
+    if "data" in job.spec:
+        now["data"] = job.spec["data"]
     if job_id(now) != job_id(job.spec):
         raise BatchStoppedError(
             f"{differences(job.spec, now)} while jobs of {job.policy.label!r} ran; what was stored "
             "is kept, and the same command goes on"
         )
+
+
+def runs_users_code(job: Job) -> bool:
+    """True if code that is not pushplan's runs in a job that `check_unchanged` has checked."""
+    return bool(job.policy.group) or any(name.endswith(".py") for name in counted)
+
+
+def read_by(job: Job, reads: Reads) -> dict[str, str]:
+    """Hashes of what a checked job has read, but for what its specification holds anyway."""
+    folder = source_folder(job.policy.source)
+    names = [name for name in reads if name not in {*counted, *_WORKERS_OWN}]
+    if folder:
+        names = [name.removeprefix(os.path.join(folder, "")) for name in names]
+    return read_digests(names[:MOST_READS], folder)
+
+
+def source_folder(source: object) -> str:
+    """Folder of a policy's ``file.py:Class``: what it reads there may be moved with it."""
+    file = str(source).rpartition(":")[0]
+    return os.path.dirname(file) if file.endswith(".py") else ""
 
 
 def job_spec(job: Job, settings: JobSettings) -> dict[str, Any]:
@@ -56,7 +89,8 @@ def job_spec(job: Job, settings: JobSettings) -> dict[str, Any]:
     Returns:
         ``policy`` (``label``, ``identity``, and ``source`` and ``options`` if it can be made from
         them again), ``scenario``, ``settings``, ``versions``, and a hash of the content for each
-        of the ``files`` that the scenario names, if it names any.
+        of the ``files`` that the scenario names, if it names any. `pending_jobs` adds ``data``:
+        hashes of what earlier results have read, if it has changed since.
     """
     return _spec(job, settings, *_of_policy(job.policy))
 
@@ -138,10 +172,13 @@ def same_but_versions(spec: Mapping[str, Any]) -> str:
 
 
 def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
-    """Describe the differences between two specifications in words."""
+    """Describe the differences between two specifications, and of what was read, in words."""
     changed = []
     noted = []
-    for section in ("policy", "scenario", "files", "settings", "versions"):
+    read = before.get("read", {})
+    folder = source_folder(now.get("policy", {}).get("source", ""))
+    now = {**now, "read": read_digests(read, folder)}
+    for section in ("policy", "scenario", "files", "read", "settings", "versions"):
         old = before.get(section, {})
         new = now.get(section, {})
         # the source of a policy may have moved, its options are in its identity

@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Any
 
 from pushplan.errors import describe
@@ -18,6 +18,8 @@ from pushplan.world import ChecksEnvironment, ChoosesActions, InvalidInputError,
 from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, OneOf, PositiveFloat
 
 DEFAULT_ENV = "pushplan.envs:make"
+MOST_READS = 1000
+"""So many files and environment variables of those that a job has read first are noted."""
 DETAIL_HALF = 10_000  # characters of a traceback that are kept at its beginning and at its end
 
 
@@ -135,11 +137,13 @@ class JobResult:
         row: its row of the results.
         trace: the recorded episode as the bytes of an ``.npz`` file, if anything was recorded.
         detail: traceback of a failure.
+        read: hash of each file and environment variable that code of users has read.
     """
 
     row: ResultRow
     trace: bytes | None = None
     detail: str = ""
+    read: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def tainted(self) -> bool:
@@ -150,26 +154,30 @@ class JobResult:
         """This result, or a failure if it cannot be one of that job."""
         try:
             row = checked_row(self.row)
+            texts = [text for pair in self.read.items() for text in pair]
+            if len(texts) > 2 * MOST_READS or not all(isinstance(one, str) for one in texts):
+                raise TypeError("what it has read is no table of hashes")
             mine = blank_row(job.policy.label, job.scenario, Status.DONE, "")
             for name in ("policy", "task", "simulator", "scenario", "seed"):
                 if getattr(row, name) != getattr(mine, name):
                     raise ValueError(f"{name} is {getattr(row, name)!r:.60}")
         except (KeyError, TypeError, ValueError) as error:
             return failed_result(job, Status.POLICY_ERROR, f"impossible result: {error}")
-        return JobResult(row, self.trace, clipped(self.detail))
+        return replace(self, row=row, detail=clipped(self.detail))
 
 
 def job_id(spec: Mapping[str, Any]) -> str:
     """Content hash of what `job_spec` gave, 32 hexadecimal digits.
 
     Where the file of a policy or a task lies does not count: its content does, in ``identity`` or
-    ``files``.
+    ``files``. What the job has ``read`` is known only afterwards: `pending_jobs` compares it.
     """
     policy = {name: spec["policy"][name] for name in ("label", "identity")}
     scenario = dict(spec["scenario"])
     if "task" in scenario:
         scenario["task"] = os.path.basename(str(scenario["task"]))
-    text = json.dumps({**spec, "policy": policy, "scenario": scenario}, sort_keys=True)
+    known = {name: value for name, value in spec.items() if name != "read"}
+    text = json.dumps({**known, "policy": policy, "scenario": scenario}, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 

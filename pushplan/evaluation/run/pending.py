@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
-from pushplan.evaluation.run.job_identity import differences, same_but_versions, settings_dict
+from pushplan.evaluation.run.job_identity import (
+    differences,
+    same_but_versions,
+    settings_dict,
+    source_folder,
+)
 from pushplan.evaluation.run.jobs import Job, JobSettings
+from pushplan.evaluation.run.policy_specs import PolicySpec
 from pushplan.evaluation.store.database import DATABASE, StoredResult
 from pushplan.evaluation.store.rows import setting_of
 from pushplan.evaluation.store.run_directory import RunDirectory
+from pushplan.evaluation.store.source_digests import read_digests
 from pushplan.world import Stop
 
 _log = logging.getLogger(__name__)
@@ -48,10 +57,12 @@ def note_batch(
 def pending_jobs(jobs: Sequence[Job], store: RunDirectory, any_version: bool) -> list[Job]:
     """The `identified` jobs without a result; results of the others count from now on."""
     stored = store.results()
-    _hide_outdated(jobs, stored, store, any_version)
-    done = {one.row.job: one.row.job for one in stored}
+    jobs, outdated = _compare_reads(jobs, stored)
+    _hide_outdated(jobs, stored, store, any_version, outdated)
+    valid = [one for one in stored if one.row.job not in outdated]
+    done = {one.row.job: one.row.job for one in valid}
     if any_version:
-        done |= {same_but_versions(one.spec): one.row.job for one in stored if one.spec}
+        done |= {same_but_versions(one.spec): one.row.job for one in valid if one.spec}
     shown = []
     pending = []
     for job in jobs:
@@ -68,20 +79,78 @@ def pending_jobs(jobs: Sequence[Job], store: RunDirectory, any_version: bool) ->
         for one in sorted(stored, key=lambda one: one.current)
     }
     if changed := [one for one in pending if one.key in before]:
+        said = (differences(before[one.key], one.spec or {}) for one in changed)
         _log.warning(
             "%d of %d jobs have results in %s from before a change: %s; they are run again, and "
             "the old results stay in %s",
             len(changed),
             len(jobs),
             store.path,
-            differences(before[changed[0].key], changed[0].spec or {}),
+            next(filter(None, said), "of what other episodes of the policy have read"),
             DATABASE,
         )
     return pending
 
 
+def _compare_reads(
+    jobs: Sequence[Job], stored: Sequence[StoredResult]
+) -> tuple[list[Job], set[str]]:
+    """Compare what code of users has read for stored results with what is there now.
+
+    It may read something once and use it in later episodes. So all results that share such code
+    hold together or not at all, as far as they began with the same ``data``.
+
+    Returns:
+        The jobs, with the ``data`` of the results that hold or, if none do, with that of now; and
+        the jobs of results that do not hold.
+    """
+    first = {job.policy.label: job for job in jobs}
+    groups: dict[str, dict[str, dict[str, str]]] = {}  # code of users -> data -> what was read
+    places: dict[str, tuple[str, str]] = {}
+    folders: dict[str, str] = {}
+    for one in stored:
+        job = first.get(one.row.policy)
+        if job is None or job.spec is None or job.spec["policy"] != one.spec.get("policy"):
+            continue
+        data = one.spec.get("data", {})
+        read = one.spec.get("read", {})
+        place = _users_code(job.policy, one.spec), json.dumps(data, sort_keys=True)
+        folders[place[0]] = source_folder(job.policy.source)
+        known = groups.setdefault(place[0], {}).setdefault(place[1], dict(data))
+        if any(data.get(name, digest) != digest for name, digest in read.items()):
+            place = place[0], ""  # it changed while they ran
+        else:
+            for name, digest in read.items():
+                if known.setdefault(name, digest) != digest:
+                    known[name] = "several"
+        places[one.row.job] = place
+    holding = {}
+    for code, group in groups.items():
+        now = read_digests({name for known in group.values() for name in known}, folders[code])
+        valid = {data: known for data, known in group.items() if known.items() <= now.items()}
+        holding[code] = max(valid, key=lambda data: len(valid[data]), default=json.dumps(now))
+    found = []
+    for job in jobs:
+        assert job.spec is not None
+        data = json.loads(holding.get(_users_code(job.policy, job.spec), "{}"))
+        found.append(replace(job, spec={**job.spec, "data": data}) if data else job)
+    return found, {job for job, (code, data) in places.items() if holding[code] != data}
+
+
+def _users_code(policy: PolicySpec, spec: Mapping[str, Any]) -> str:
+    """Text that is the same for jobs in which the same code of users runs."""
+    if policy.group:
+        return policy.label
+    files = spec.get("files", {}).items()
+    return json.dumps({name: one for name, one in files if not name.endswith("_file")})
+
+
 def _hide_outdated(
-    jobs: Sequence[Job], stored: Sequence[StoredResult], store: RunDirectory, any_version: bool
+    jobs: Sequence[Job],
+    stored: Sequence[StoredResult],
+    store: RunDirectory,
+    any_version: bool,
+    outdated: Container[str],
 ) -> None:
     """Let results of a policy that is another one now, or was run otherwise, count no more.
 
@@ -95,14 +164,14 @@ def _hide_outdated(
         policies[job.policy.label] = job.spec["policy"]["identity"]
         setting = job.policy.label, setting_of(*job.key[1:])
         ways[setting] = [job.spec[name] for name in names]
-    outdated = []
+    hidden = []
     for one in stored:
         if not one.spec:  # saved from a CSV file, which does not say how it came about
             continue
         row = one.row
         identity = one.spec.get("policy", {}).get("identity")
         way = [one.spec.get(name) for name in names]
-        changed = policies.get(row.policy, identity) != identity
+        changed = row.job in outdated or policies.get(row.policy, identity) != identity
         if changed or ways.get((row.policy, setting_of(row.scenario, row.seed)), way) != way:
-            outdated.append(row.job)
-    store.hide(outdated)
+            hidden.append(row.job)
+    store.hide(hidden)

@@ -10,7 +10,7 @@ import sys
 import threading
 from collections import deque
 from concurrent.futures import BrokenExecutor, Future
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from pushplan.errors import describe
@@ -136,8 +136,7 @@ class WorkerPool:
                     worker.end()
                     worker = None
                 if worker is None:
-                    worker = self._start(log)
-                    worker.group = call.group
+                    worker = self._start(call.group, log)
                 result = worker.ask(call.payload, self._limit_s)
             except InvalidInputError as error:
                 call.future.set_exception(error)
@@ -178,11 +177,11 @@ class WorkerPool:
                 if call.future.running() or call.future.set_running_or_notify_cancel():
                     return call
 
-    def _start(self, log: Path | None) -> WorkerProcess:
-        """A worker that is ready."""
+    def _start(self, group: str, log: Path | None) -> WorkerProcess:
+        """A worker that is ready for calls of a group."""
         ending = ""
         for _ in range(_STARTS):
-            worker = WorkerProcess(self._setup, log)
+            worker = WorkerProcess(replace(self._setup, observing=bool(group)), group, log)
             with self._changed:
                 self._workers[threading.current_thread()] = worker
                 if self._killed:

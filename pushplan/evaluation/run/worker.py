@@ -22,6 +22,7 @@ from typing import Any
 
 from pushplan.errors import describe
 from pushplan.evaluation.run.job_limits import limit_memory
+from pushplan.imports.observed_reads import observing
 from pushplan.world import InvalidInputError
 
 _DIE_WITH_OWNER = 1  # PR_SET_PDEATHSIG of Linux, however the owner ends
@@ -46,6 +47,7 @@ class WorkerSetup:
     preload: Sequence[str]  # modules to import before the first call, so that no call pays for it
     memory_limit_mb: float | None  # private memory at which allocations fail [MB]
     trace_after_s: float | None  # a call that takes this long has its stack written to the log [s]
+    observing: bool = False  # its calls run code of users
 
 
 def main(descriptor: int) -> None:
@@ -86,9 +88,10 @@ def _answer(lines: BufferedRWPair, payload: bytes, setup: WorkerSetup) -> bool:
         if setup.trace_after_s is not None:
             faulthandler.dump_traceback_later(setup.trace_after_s)
         try:
-            if b"__main__" in payload and setup.main is not None:
-                _import_main(setup.main)
-            job, settings = pickle.loads(payload)
+            with observing(kept=True) if setup.observing else contextlib.nullcontext():
+                if b"__main__" in payload and setup.main is not None:
+                    _import_main(setup.main)
+                job, settings = pickle.loads(payload)
         except (AttributeError, ImportError) as error:
             text = (
                 f"a worker process cannot load what it was sent ({error}): define it at the top "
@@ -104,7 +107,8 @@ def _answer(lines: BufferedRWPair, payload: bytes, setup: WorkerSetup) -> bool:
         trace = None
         if result.trace is not None:
             trace = base64.b64encode(result.trace).decode()
-        _say(lines, kind="result", row=asdict(result.row), trace=trace, detail=result.detail)
+        said = {**vars(result), "row": asdict(result.row), "trace": trace}
+        _say(lines, kind="result", **said)
         return result.tainted
     except InvalidInputError as error:  # `execute` lets through what is no policy's fault
         _say(lines, kind="refused", text=str(error))

@@ -68,11 +68,12 @@ class WorkerProcess:
 
     Args:
         setup: what it is told first.
+        group: of the calls that it answers.
         log: file for what it writes to standard output and error; discarded if None.
     """
 
-    def __init__(self, setup: WorkerSetup, log: Path | None) -> None:
-        self.group: str | None = None  # of the calls that it answers; None before the first
+    def __init__(self, setup: WorkerSetup, group: str, log: Path | None) -> None:
+        self.group = group
         self._setup = setup
         self._log = log
         self._log_start = 0
@@ -129,7 +130,8 @@ class WorkerProcess:
             trace = said["trace"]
             if trace is not None:
                 trace = base64.b64decode(trace)
-            return JobResult(ResultRow(**said["row"]), trace, str(said["detail"]))
+            row = ResultRow(**said["row"])
+            return JobResult(row, trace, str(said["detail"]), dict(said["read"]))
         except (KeyError, TypeError, ValueError) as error:
             raise self._died(f"its message is no result: {error}") from error
 

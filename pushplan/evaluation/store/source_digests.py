@@ -21,6 +21,8 @@ from pushplan.imports.named_objects import import_path
 
 _DATA = (".yaml", ".yml", ".json")
 _IMPORTERS = ("import_module", "__import__")
+counted: set[str] = set()
+"""Paths of the files that were hashed since it was cleared."""
 
 
 def source_digest(where: str) -> str:
@@ -44,6 +46,25 @@ def file_digest(path: str | Path) -> str:
     The files that a file of data names count with it: a world names a map, and the map a picture.
     """
     return _joined(_named_files(Path(path)))
+
+
+def read_digests(names: Iterable[str], folder: str) -> dict[str, str]:
+    """Hashes of what code of users has read, by name, as it is now; empty for what is missing.
+
+    Args:
+        names: paths of files, below ``folder`` or absolute, and environment variables with a ``$``.
+        folder: of the policy's file.
+    """
+    found = {}
+    for name in sorted(names):
+        found[name] = ""
+        with contextlib.suppress(OSError, ValueError):
+            file = Path(folder, name)
+            if not name.startswith("$") and file.is_file():
+                found[name] = _content_hash(file, *_version(file))
+            elif (value := os.environ.get(name.removeprefix("$"))) is not None:
+                found[name] = hashlib.sha256(os.fsencode(value)).hexdigest()[:12]
+    return found
 
 
 def code_digest(thing: Any) -> str:
@@ -72,6 +93,7 @@ def _code_text(code: CodeType) -> str:
 def _joined(files: Iterable[Path]) -> str:
     """The hash of one file, or of several with their names."""
     hashes = {file: _content_hash(file, *_version(file)) for file in files if file.is_file()}
+    counted.update(os.path.abspath(file) for file in hashes)
     if len(hashes) > 1:
         text = "".join(f"{file.name} {one}\n" for file, one in hashes.items())
         return f" sha256:{hashlib.sha256(text.encode()).hexdigest()[:12]}"
@@ -86,7 +108,8 @@ def _version(file: Path) -> tuple[int, ...]:
 
 @functools.lru_cache(maxsize=1024)
 def _content_hash(file: Path, *_version: int) -> str:
-    return hashlib.sha256(file.read_bytes()).hexdigest()[:12]
+    with file.open("rb") as content:
+        return hashlib.file_digest(content, "sha256").hexdigest()[:12]
 
 
 def _sources(where: str) -> list[Path]:
