@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import ctypes
 import hashlib
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from pushplan.errors import PushplanError
 
@@ -15,6 +12,7 @@ try:
     from pushplan._core import (
         COMPILER,
         SOURCES,
+        audit_hook,
         control,
         envs,
         geometry,
@@ -38,7 +36,7 @@ except ImportError as error:
 __all__ = [
     "COMPILER",
     "SOURCES",
-    "add_audit_hook",
+    "audit_hook",
     "cmake_dir",
     "control",
     "envs",
@@ -73,18 +71,6 @@ def is_stale() -> bool:
         f"{name} {hashlib.sha256(files[name].read_bytes()).hexdigest()}\n" for name in sorted(files)
     )
     return hashlib.sha256(listing.encode()).hexdigest()[:12] != SOURCES
-
-
-def add_audit_hook(listener: Callable[[str, tuple[Any, ...]], object]) -> None:
-    """Call a function for each audit event of Python that tells what a program reads.
-
-    The hook cannot be removed. It is one in C, which takes much less time than `sys.addaudithook`.
-
-    Args:
-        listener: takes the name of the event and its arguments; the last one that was given.
-    """
-    hook = ctypes.c_void_p(_core.audit_hook(listener))
-    ctypes.pythonapi.PySys_AddAuditHook(hook, None)
 
 
 def cmake_dir() -> Path:

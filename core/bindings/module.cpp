@@ -1,5 +1,3 @@
-#include <algorithm>
-#include <array>
 #include <cstdint>
 #include <string_view>
 
@@ -11,12 +9,9 @@ namespace {
 
 PyObject* listener = nullptr;
 
-// Python calls this for each event that it audits. Most are calls of id() in deep copies, which a
-// hook in Python would slow down by two thirds; only those that tell what is read are passed on.
+// Nearly all events are calls of id(): a hook in Python would slow deep copies down by two thirds.
 int hear(const char* event, PyObject* arguments, void*) {
-  constexpr std::array<std::string_view, 6> passed{"open",     "import",         "ctypes.dlopen",
-                                                   "os.putenv", "sqlite3.connect", "os.unsetenv"};
-  if (std::ranges::find(passed, std::string_view(event)) == passed.end()) {
+  if (std::string_view(event) == "builtins.id") {
     return 0;
   }
   PyObject* answer = PyObject_CallFunction(listener, "sO", event, arguments);

@@ -20,7 +20,7 @@ from pushplan.errors import (
     short,
     unknown_name_message,
 )
-from pushplan.imports.observed_reads import PREFIX, forget_modules, has_changed, observing
+from pushplan.imports.observed_reads import PREFIX, forget_modules, has_changed, kept, observing
 from pushplan.imports.on_demand import look_up
 
 _folders: list[str] = []
@@ -134,7 +134,7 @@ def _fresh_modules() -> Iterator[None]:
     """Import all of a user's modules again if one, or what they have read, has been edited."""
     if has_changed():
         forget_modules()
-    with observing(kept=True):
+    with observing(kept):
         yield
 
 

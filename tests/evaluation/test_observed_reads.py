@@ -13,6 +13,7 @@ import pytest
 from evaluation_doubles import HERE, LineScenario
 
 from pushplan.evaluation import Job, JobSettings, Results, parse_policy, run_batch
+from pushplan.evaluation.run.execute import execute
 from pushplan.evaluation.run.job_identity import job_spec
 from pushplan.evaluation.store.database import read_results, reading
 from pushplan.evaluation.store.rows import TIMING_COLUMNS, ResultRow
@@ -294,13 +295,15 @@ class Mine(MazeTask):
 """
 
 
-def test_without_code_of_a_user_nothing_is_observed(monkeypatch: pytest.MonkeyPatch) -> None:
-    from pushplan.evaluation.run.execute import execute
-
-    monkeypatch.setattr("pushplan.evaluation.run.execute.observing", None)
+def test_without_code_of_a_user_nothing_is_noted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Pushplan's own files are in the versions."""
+    monkeypatch.chdir(tmp_path)
     job = Job(parse_policy("straight"), Scenario("maze", variations={"time_limit": 1.0}))
     job = Job(job.policy, job.scenario, job_spec(job, JobSettings()))
-    assert not execute(job, JobSettings()).row.failed
+    found = execute(job, JobSettings())
+    assert not found.row.failed and not found.read
 
 
 def test_a_directory_of_before_counts_as_it_is(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from pushplan.errors import describe
-from pushplan.evaluation.run.job_identity import check_unchanged, read_by, runs_users_code
+from pushplan.evaluation.run.job_identity import check_unchanged, read_by
 from pushplan.evaluation.run.job_limits import EpisodeTimeout, hard_limit, is_ctrl_c, soft_limit
 from pushplan.evaluation.run.jobs import (
     BatchStoppedError,
@@ -35,7 +35,7 @@ from pushplan.evaluation.run.policy_calls import (
 from pushplan.evaluation.run.policy_specs import UnusablePolicyError
 from pushplan.evaluation.run.recording import Recording
 from pushplan.evaluation.store.rows import Status, blank_row, clean_reason, instant, scored_row
-from pushplan.imports.observed_reads import Reads, observing, once
+from pushplan.imports.observed_reads import Reads, kept, observing
 from pushplan.world import InvalidInputError, MissingDependencyError
 from pushplan.world.policy_abilities import (
     ChecksEnvironment,
@@ -71,18 +71,13 @@ def execute(job: Job, settings: JobSettings, owner_pid: int | None = None) -> Jo
         by_force = settings.force_after_s
     reads: Reads = {}
     result = _outcome(job, settings, by_force, reads)
-    return replace(result, read=read_by(job, reads))
+    return replace(result, read=read_by(job, {**kept, **reads}))
 
 
 def _outcome(job: Job, settings: JobSettings, by_force: float | None, reads: Reads) -> JobResult:
     try:
         check_unchanged(job, settings)
-        with (
-            _observed(job, reads),
-            _folder_kept(),
-            hard_limit(by_force),
-            soft_limit(settings.timeout_s),
-        ):
+        with observing(reads), _folder_kept(), hard_limit(by_force), soft_limit(settings.timeout_s):
             return _execute(job, settings)
     except BatchStoppedError:
         raise
@@ -99,19 +94,6 @@ def _outcome(job: Job, settings: JobSettings, by_force: float | None, reads: Rea
 
 
 @contextlib.contextmanager
-def _observed(job: Job, reads: Reads) -> Iterator[None]:
-    """Add what code of users reads in a job; without such code, nothing is looked at."""
-    if not runs_users_code(job):
-        yield
-        return
-    try:
-        with observing() as seen:
-            yield
-    finally:
-        reads.update({**once, **seen})
-
-
-@contextlib.contextmanager
 def _folder_kept() -> Iterator[None]:
     """Go back to the working folder, in which the files of the next job are looked for."""
     folder = os.getcwd()
@@ -123,7 +105,7 @@ def _folder_kept() -> Iterator[None]:
 
 def _execute(job: Job, settings: JobSettings) -> JobResult:
     if settings.dry_run:
-        with observing(kept=True) if runs_users_code(job) else contextlib.nullcontext():
+        with observing(kept):
             dry_run(job, settings)
     # a policy that uses the global generators against our advice repeats all the same
     random.seed(job.scenario.seed)

@@ -21,6 +21,7 @@ from pushplan.evaluation.store.provenance import PACKAGES, versions
 from pushplan.evaluation.store.source_digests import (
     counted,
     file_digest,
+    imported_by,
     read_digests,
     source_digest,
 )
@@ -32,6 +33,7 @@ from pushplan.world.stored.robots import robots
 
 _MOST_DIFFERENCES = 4
 _WORKERS_OWN = [f"${name}" for name in (*THREAD_VARIABLES, WORKER_VARIABLE, "PYTHONUNBUFFERED")]
+_OF_SB3 = {"stable_baselines3", "torch"}
 _OURS = "pushplan."
 
 
@@ -50,7 +52,6 @@ def check_unchanged(job: Job, settings: JobSettings) -> None:
     Raises:
         BatchStoppedError: if they are others.
     """
-    counted.clear()
     if job.spec is None:
         return
     now = job_spec(job, settings)
@@ -63,13 +64,13 @@ def check_unchanged(job: Job, settings: JobSettings) -> None:
         )
 
 
-def runs_users_code(job: Job) -> bool:
-    """True if code that is not pushplan's runs in a job that `check_unchanged` has checked."""
-    return bool(job.policy.group) or any(name.endswith(".py") for name in counted)
-
-
 def read_by(job: Job, reads: Reads) -> dict[str, str]:
-    """Hashes of what a checked job has read, but for what its specification holds anyway."""
+    """Hashes of what code of users has read in a job that `check_unchanged` has checked.
+
+    What its specification holds is left out.
+    """
+    if not job.policy.group and not any(name.endswith(".py") for name in counted):
+        return {}
     folder = source_folder(job.policy.source)
     names = [name for name in reads if name not in {*counted, *_WORKERS_OWN}]
     if folder:
@@ -97,11 +98,13 @@ def job_spec(job: Job, settings: JobSettings) -> dict[str, Any]:
 
 def _of_policy(spec: PolicySpec) -> tuple[dict[str, Any], dict[str, str]]:
     """Return the description of a policy, and versions of the libraries that its own code uses."""
+    counted.clear()
     policy: dict[str, Any] = {"label": spec.label, "identity": spec.identity}
     with contextlib.suppress(TypeError):
         if isinstance(spec.source, str):
             policy |= {"options": _plain(spec.options), "source": spec.source}
-    others = spec.libraries - {*PACKAGES, *sys.stdlib_module_names, "pushplan"}
+    libraries = _OF_SB3 if str(spec.source).startswith("sb3:") else imported_by(counted)
+    others = libraries - {*PACKAGES, *sys.stdlib_module_names, "pushplan"}
     packages = sorted({name for module in others for name in _distributions().get(module, ())})
     return policy, {name: metadata.version(name) for name in packages}
 

@@ -16,7 +16,6 @@ from pushplan.evaluation.run.job_identity import (
     source_folder,
 )
 from pushplan.evaluation.run.jobs import Job, JobSettings
-from pushplan.evaluation.run.policy_specs import PolicySpec
 from pushplan.evaluation.store.database import DATABASE, StoredResult
 from pushplan.evaluation.store.rows import setting_of
 from pushplan.evaluation.store.run_directory import RunDirectory
@@ -98,49 +97,43 @@ def _compare_reads(
     """Compare what code of users has read for stored results with what is there now.
 
     It may read something once and use it in later episodes. So all results that share such code
-    hold together or not at all, as far as they began with the same ``data``.
+    and began with the same ``data`` hold together, or none of them does.
 
     Returns:
         The jobs, with the ``data`` of the results that hold or, if none do, with that of now; and
-        the jobs of results that do not hold.
+        the results that do not hold.
     """
     first = {job.policy.label: job for job in jobs}
     groups: dict[str, dict[str, dict[str, str]]] = {}  # code of users -> data -> what was read
     places: dict[str, tuple[str, str]] = {}
-    folders: dict[str, str] = {}
     for one in stored:
         job = first.get(one.row.policy)
         if job is None or job.spec is None or job.spec["policy"] != one.spec.get("policy"):
             continue
-        data = one.spec.get("data", {})
+        code = _users_code(job, one.spec)
+        data = json.dumps(one.spec.get("data", {}), sort_keys=True)
+        known = groups.setdefault(code, {}).setdefault(data, json.loads(data))
         read = one.spec.get("read", {})
-        place = _users_code(job.policy, one.spec), json.dumps(data, sort_keys=True)
-        folders[place[0]] = source_folder(job.policy.source)
-        known = groups.setdefault(place[0], {}).setdefault(place[1], dict(data))
-        if any(data.get(name, digest) != digest for name, digest in read.items()):
-            place = place[0], ""  # it changed while they ran
-        else:
-            for name, digest in read.items():
-                if known.setdefault(name, digest) != digest:
-                    known[name] = "several"
-        places[one.row.job] = place
+        places[one.row.job] = code, data
+        if any(known.setdefault(name, digest) != digest for name, digest in read.items()):
+            places[one.row.job] = code, ""  # it changed while they ran
     holding = {}
     for code, group in groups.items():
-        now = read_digests({name for known in group.values() for name in known}, folders[code])
+        names = {name for known in group.values() for name in known}
+        now = read_digests(names, source_folder(code))
         valid = {data: known for data, known in group.items() if known.items() <= now.items()}
         holding[code] = max(valid, key=lambda data: len(valid[data]), default=json.dumps(now))
     found = []
     for job in jobs:
-        assert job.spec is not None
-        data = json.loads(holding.get(_users_code(job.policy, job.spec), "{}"))
-        found.append(replace(job, spec={**job.spec, "data": data}) if data else job)
+        data = json.loads(holding.get(_users_code(job, job.spec or {}), "{}"))
+        found.append(replace(job, spec={**(job.spec or {}), "data": data}) if data else job)
     return found, {job for job, (code, data) in places.items() if holding[code] != data}
 
 
-def _users_code(policy: PolicySpec, spec: Mapping[str, Any]) -> str:
+def _users_code(job: Job, spec: Mapping[str, Any]) -> str:
     """Text that is the same for jobs in which the same code of users runs."""
-    if policy.group:
-        return policy.label
+    if job.policy.group:
+        return str(job.policy.source)
     files = spec.get("files", {}).items()
     return json.dumps({name: one for name, one in files if not name.endswith("_file")})
 

@@ -19,7 +19,6 @@ from pushplan.errors import describe, place
 from pushplan.evaluation.store.source_digests import (
     code_digest,
     file_digest,
-    libraries_of,
     source_digest,
 )
 from pushplan.imports.named_objects import load_object, names_to_give
@@ -84,23 +83,6 @@ class PolicySpec:
         where, _, name = self.source.rpartition(":")
         shown = Path(where).name if where.endswith(".py") else where
         return f"{shown}{':' if where else ''}{name}{source_digest(where)}{options}"
-
-    @property
-    def libraries(self) -> set[str]:
-        """Modules that its own code imports, by the first part of their names."""
-        source: Any = self.source
-        if isinstance(source, functools.partial):
-            inner = [one for one in source.args if isinstance(one, PolicySpec)]
-            parts = inner or [PolicySpec(self.label, source.func)]
-            return set().union(*(one.libraries for one in parts))
-        if not isinstance(source, str):
-            named = source if hasattr(source, "__module__") else type(source)
-            return libraries_of(_module_of(named))
-        if source.startswith("sb3:"):
-            return {"stable_baselines3", "torch"}
-        if self.is_ours:
-            return set()
-        return libraries_of(source.rpartition(":")[0])
 
     @property
     def is_ours(self) -> bool:

@@ -10,7 +10,7 @@ import sys
 import threading
 from collections import deque
 from concurrent.futures import BrokenExecutor, Future
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from pushplan.errors import describe
@@ -136,7 +136,8 @@ class WorkerPool:
                     worker.end()
                     worker = None
                 if worker is None:
-                    worker = self._start(call.group, log)
+                    worker = self._start(log)
+                    worker.group = call.group
                 result = worker.ask(call.payload, self._limit_s)
             except InvalidInputError as error:
                 call.future.set_exception(error)
@@ -177,11 +178,11 @@ class WorkerPool:
                 if call.future.running() or call.future.set_running_or_notify_cancel():
                     return call
 
-    def _start(self, group: str, log: Path | None) -> WorkerProcess:
-        """A worker that is ready for calls of a group."""
+    def _start(self, log: Path | None) -> WorkerProcess:
+        """A worker that is ready."""
         ending = ""
         for _ in range(_STARTS):
-            worker = WorkerProcess(replace(self._setup, observing=bool(group)), group, log)
+            worker = WorkerProcess(self._setup, log)
             with self._changed:
                 self._workers[threading.current_thread()] = worker
                 if self._killed:

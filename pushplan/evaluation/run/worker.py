@@ -22,7 +22,7 @@ from typing import Any
 
 from pushplan.errors import describe
 from pushplan.evaluation.run.job_limits import limit_memory
-from pushplan.imports.observed_reads import observing
+from pushplan.imports.observed_reads import kept, observing
 from pushplan.world import InvalidInputError
 
 _DIE_WITH_OWNER = 1  # PR_SET_PDEATHSIG of Linux, however the owner ends
@@ -47,7 +47,6 @@ class WorkerSetup:
     preload: Sequence[str]  # modules to import before the first call, so that no call pays for it
     memory_limit_mb: float | None  # private memory at which allocations fail [MB]
     trace_after_s: float | None  # a call that takes this long has its stack written to the log [s]
-    observing: bool = False  # its calls run code of users
 
 
 def main(descriptor: int) -> None:
@@ -88,7 +87,7 @@ def _answer(lines: BufferedRWPair, payload: bytes, setup: WorkerSetup) -> bool:
         if setup.trace_after_s is not None:
             faulthandler.dump_traceback_later(setup.trace_after_s)
         try:
-            with observing(kept=True) if setup.observing else contextlib.nullcontext():
+            with observing(kept):
                 if b"__main__" in payload and setup.main is not None:
                     _import_main(setup.main)
                 job, settings = pickle.loads(payload)

@@ -68,12 +68,11 @@ class WorkerProcess:
 
     Args:
         setup: what it is told first.
-        group: of the calls that it answers.
         log: file for what it writes to standard output and error; discarded if None.
     """
 
-    def __init__(self, setup: WorkerSetup, group: str, log: Path | None) -> None:
-        self.group = group
+    def __init__(self, setup: WorkerSetup, log: Path | None) -> None:
+        self.group: str | None = None  # of the calls that it answers; None before the first
         self._setup = setup
         self._log = log
         self._log_start = 0

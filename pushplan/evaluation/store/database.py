@@ -259,9 +259,6 @@ def result_of(
     spec = _json(values["spec"])
     if not isinstance(spec, dict):
         raise TypeError(f"spec is {short(spec)}")
-    for name in ("policy", "data", "read"):
-        if not isinstance(spec.get(name, {}), dict):
-            raise TypeError(f"{name} is {short(spec[name])}")
     return StoredResult(_row_of(values), spec, bool(values["current"]), tuple(measured))
 
 

@@ -18,6 +18,7 @@ from typing import Any
 from pushplan.errors import PushplanError, is_a_users
 from pushplan.files.safe_files import read_data
 from pushplan.imports.named_objects import import_path
+from pushplan.imports.observed_reads import version
 
 _DATA = (".yaml", ".yml", ".json")
 _IMPORTERS = ("import_module", "__import__")
@@ -34,10 +35,11 @@ def source_digest(where: str) -> str:
     return _joined(_sources(where))
 
 
-def libraries_of(where: str) -> set[str]:
-    """First parts of the names of all modules that a source and its local modules import."""
-    files = _sources(where)
-    return {name.partition(".")[0] for file in files for _, name in _imports(file, *_version(file))}
+def imported_by(files: Iterable[str]) -> set[str]:
+    """First parts of the names of all modules that files of source import."""
+    sources = [Path(file) for file in files if file.endswith(".py")]
+    found = (name for file in sources for _, name in _imports(file, version(file)))
+    return {name.partition(".")[0] for name in found}
 
 
 def file_digest(path: str | Path) -> str:
@@ -61,7 +63,7 @@ def read_digests(names: Iterable[str], folder: str) -> dict[str, str]:
         with contextlib.suppress(OSError, ValueError):
             file = Path(folder, name)
             if not name.startswith("$") and file.is_file():
-                found[name] = _content_hash(file, *_version(file))
+                found[name] = _content_hash(file, version(file))
             elif (value := os.environ.get(name.removeprefix("$"))) is not None:
                 found[name] = hashlib.sha256(os.fsencode(value)).hexdigest()[:12]
     return found
@@ -92,7 +94,7 @@ def _code_text(code: CodeType) -> str:
 
 def _joined(files: Iterable[Path]) -> str:
     """The hash of one file, or of several with their names."""
-    hashes = {file: _content_hash(file, *_version(file)) for file in files if file.is_file()}
+    hashes = {file: _content_hash(file, version(file)) for file in files if file.is_file()}
     counted.update(os.path.abspath(file) for file in hashes)
     if len(hashes) > 1:
         text = "".join(f"{file.name} {one}\n" for file, one in hashes.items())
@@ -100,14 +102,8 @@ def _joined(files: Iterable[Path]) -> str:
     return "".join(f" sha256:{one}" for one in hashes.values())
 
 
-def _version(file: Path) -> tuple[int, ...]:
-    """Return a key that changes when a file is rewritten; thousands of jobs ask for the same."""
-    found = file.stat()
-    return found.st_mtime_ns, found.st_size, found.st_ino
-
-
 @functools.lru_cache(maxsize=1024)
-def _content_hash(file: Path, *_version: int) -> str:
+def _content_hash(file: Path, _version: object) -> str:
     with file.open("rb") as content:
         return hashlib.file_digest(content, "sha256").hexdigest()[:12]
 
@@ -123,7 +119,7 @@ def _sources(where: str) -> list[Path]:
     found = [first]
     path = _dated(import_path(str(first.parent)))
     for file in found:  # which grows meanwhile
-        for level, name in _imports(file, *_version(file)):
+        for level, name in _imports(file, version(file)):
             folders = _dated([str(file.parents[level - 1])]) if level else path
             found += [one for one in _modules(name, folders) if one not in found]
     return found
@@ -145,7 +141,7 @@ def _file_of(module: str) -> Path | None:
 
 
 @functools.lru_cache(maxsize=1024)
-def _imports(file: Path, *_version: int) -> tuple[tuple[int, str], ...]:
+def _imports(file: Path, _version: object) -> tuple[tuple[int, str], ...]:
     """Dots before and name of each module that a file of source may import."""
     found: list[tuple[int, str]] = []
     with contextlib.suppress(SyntaxError, ValueError):  # no source: an extension, for one
@@ -162,7 +158,7 @@ def _imports(file: Path, *_version: int) -> tuple[tuple[int, str], ...]:
     return tuple(found)
 
 
-def _modules(name: str, folders: Sequence[tuple[str, int]]) -> Iterator[Path]:
+def _modules(name: str, folders: Sequence[tuple[str, object]]) -> Iterator[Path]:
     """Local files of a module, and of the packages around it."""
     for part in name.split("."):
         if not folders or _is_installed(part, tuple(folders)):
@@ -175,19 +171,13 @@ def _modules(name: str, folders: Sequence[tuple[str, int]]) -> Iterator[Path]:
         folders = _dated(spec.submodule_search_locations or ())
 
 
-def _dated(folders: Iterable[str]) -> tuple[tuple[str, int], ...]:
-    """Folders, and when something was put into each or taken out of it last."""
-    dated = []
-    for folder in folders:
-        changed = 0
-        with contextlib.suppress(OSError):
-            changed = os.stat(folder or os.curdir).st_mtime_ns
-        dated.append((folder, changed))
-    return tuple(dated)
+def _dated(folders: Iterable[str]) -> tuple[tuple[str, object], ...]:
+    """Folders, and versions that change when something is put into one or taken out of it."""
+    return tuple((folder, version(folder or os.curdir)) for folder in folders)
 
 
 @functools.lru_cache(maxsize=1024)
-def _is_installed(part: str, folders: tuple[tuple[str, int], ...]) -> bool:
+def _is_installed(part: str, folders: tuple[tuple[str, object], ...]) -> bool:
     """True if the first module of this name in these folders is none of a user's."""
     spec = PathFinder.find_spec(part, [folder for folder, _ in folders])
     if spec is None or not spec.has_location or spec.origin is None:
@@ -196,7 +186,7 @@ def _is_installed(part: str, folders: tuple[tuple[str, int], ...]) -> bool:
 
 
 @functools.lru_cache(maxsize=1024)
-def _named(file: Path, *_version: int) -> tuple[str, ...]:
+def _named(file: Path, _version: object) -> tuple[str, ...]:
     """Every text in a file of data."""
     texts: list[str] = []
     with contextlib.suppress(PushplanError):
@@ -212,6 +202,6 @@ def _named(file: Path, *_version: int) -> tuple[str, ...]:
 def _named_files(path: Path) -> list[Path]:
     found = [path] if os.path.isfile(path) else []
     for file in found:  # which grows meanwhile
-        paths = [file.parent / text for text in _named(file, *_version(file))]
+        paths = [file.parent / text for text in _named(file, version(file))]
         found += [one for one in paths if os.path.isfile(one) and one not in found]
     return found
