@@ -287,6 +287,14 @@ def test_environments_tasks_and_settings_of_ones_own_count(
     (tmp_path / "own_task.py").touch()
     monkeypatch.setitem(registry.TASKS, "maze", "own_task:Task")
     assert changes(tmp_path / "own_task.py", identity)
+    (tmp_path / "own_robot.py").write_text("import shape\n")
+    (tmp_path / "shape.py").touch()
+    for scenario in (
+        Scenario("ship_ice", variations={"robot": f"{tmp_path}/own_robot.py:cart"}),
+        Scenario(f"{tmp_path}/own_robot.py:Task"),
+    ):
+        for name in ("own_robot.py", "shape.py"):
+            assert changes(tmp_path / name, lambda s=scenario: identity(scenario=s)), name
     several = [
         JobSettings(timeout_s=1.0),
         JobSettings(timeout_s=2.0),

@@ -119,6 +119,7 @@ def check_that_all_run_again(
     assert second[1].path_length_m != first[1].path_length_m
     assert run() == (0, second)
     back()
+    assert run(1) == (0, first[:1])
     assert run() == (0, first)
     assert Results.load(run.options["out"]).rows == tuple(first)
 

@@ -226,14 +226,14 @@ class _Batch:
         kept = self.traces == "all" or (self.traces == "failures" and not row.success)
         trace = outcome.trace if kept else None
         spec = {**(job.spec or {}), **({"read": dict(outcome.read)} if outcome.read else {})}
-        row = self.store.add(row, trace, outcome.detail, spec)
         known = self.read.setdefault(row.policy, {})
-        for name, digest in outcome.read.items():
+        for name, digest in (*spec.get("data", {}).items(), *outcome.read.items()):
             if known.setdefault(name, digest) != digest:
                 raise BatchStoppedError(
                     f"{name}, which code of yours reads, has changed while jobs of "
                     f"{row.policy!r} ran; what was stored is kept, and the same command goes on"
                 )
+        row = self.store.add(row, trace, outcome.detail, spec)
         self.done += 1
         if self.progress is not None:
             self.progress(self.done, self.total, row)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import math
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -56,12 +56,11 @@ def note_batch(
 def pending_jobs(jobs: Sequence[Job], store: RunDirectory, any_version: bool) -> list[Job]:
     """The `identified` jobs without a result; results of the others count from now on."""
     stored = store.results()
-    jobs, outdated = _compare_reads(jobs, stored)
-    _hide_outdated(jobs, stored, store, any_version, outdated)
-    valid = [one for one in stored if one.row.job not in outdated]
-    done = {one.row.job: one.row.job for one in valid}
+    jobs = _with_data(jobs, stored)
+    _hide_outdated(jobs, stored, store, any_version)
+    done = {one.row.job: one.row.job for one in stored}
     if any_version:
-        done |= {same_but_versions(one.spec): one.row.job for one in valid if one.spec}
+        done |= {same_but_versions(one.spec): one.row.job for one in stored if one.spec}
     shown = []
     pending = []
     for job in jobs:
@@ -91,43 +90,36 @@ def pending_jobs(jobs: Sequence[Job], store: RunDirectory, any_version: bool) ->
     return pending
 
 
-def _compare_reads(
-    jobs: Sequence[Job], stored: Sequence[StoredResult]
-) -> tuple[list[Job], set[str]]:
-    """Compare what code of users has read for stored results with what is there now.
+def _with_data(jobs: Sequence[Job], stored: Sequence[StoredResult]) -> list[Job]:
+    """The jobs with the ``data`` of those results of theirs that still hold.
 
-    It may read something once and use it in later episodes. So all results that share such code
-    and began with the same ``data`` hold together, or none of them does.
-
-    Returns:
-        The jobs, with the ``data`` of the results that hold or, if none do, with that of now; and
-        the results that do not hold.
+    If none do, it is what their code has read before, as it is now. Code of a user may read
+    something once and use it in later episodes: results with the same code and ``data`` hold
+    together, or none of them does.
     """
     first = {job.policy.label: job for job in jobs}
     groups: dict[str, dict[str, dict[str, str]]] = {}  # code of users -> data -> what was read
-    places: dict[str, tuple[str, str]] = {}
     for one in stored:
         job = first.get(one.row.policy)
         if job is None or job.spec is None or job.spec["policy"] != one.spec.get("policy"):
             continue
-        code = _users_code(job, one.spec)
-        data = json.dumps(one.spec.get("data", {}), sort_keys=True)
-        known = groups.setdefault(code, {}).setdefault(data, json.loads(data))
-        read = one.spec.get("read", {})
-        places[one.row.job] = code, data
-        if any(known.setdefault(name, digest) != digest for name, digest in read.items()):
-            places[one.row.job] = code, ""  # it changed while they ran
-    holding = {}
+        data = json.dumps(one.spec.get("data", {}))
+        group = groups.setdefault(_users_code(job, one.spec), {})
+        known = group.setdefault(data, json.loads(data))
+        for name, digest in one.spec.get("read", {}).items():
+            if known.setdefault(name, digest) != digest:
+                known[name] = "several"
+    chosen = {}
     for code, group in groups.items():
         names = {name for known in group.values() for name in known}
         now = read_digests(names, source_folder(code))
         valid = {data: known for data, known in group.items() if known.items() <= now.items()}
-        holding[code] = max(valid, key=lambda data: len(valid[data]), default=json.dumps(now))
+        chosen[code] = max(valid, key=lambda data: len(valid[data]), default=json.dumps(now))
     found = []
     for job in jobs:
-        data = json.loads(holding.get(_users_code(job, job.spec or {}), "{}"))
+        data = json.loads(chosen.get(_users_code(job, job.spec or {}), "{}"))
         found.append(replace(job, spec={**(job.spec or {}), "data": data}) if data else job)
-    return found, {job for job, (code, data) in places.items() if holding[code] != data}
+    return found
 
 
 def _users_code(job: Job, spec: Mapping[str, Any]) -> str:
@@ -139,32 +131,33 @@ def _users_code(job: Job, spec: Mapping[str, Any]) -> str:
 
 
 def _hide_outdated(
-    jobs: Sequence[Job],
-    stored: Sequence[StoredResult],
-    store: RunDirectory,
-    any_version: bool,
-    outdated: Container[str],
+    jobs: Sequence[Job], stored: Sequence[StoredResult], store: RunDirectory, any_version: bool
 ) -> None:
     """Let results of a policy that is another one now, or was run otherwise, count no more.
 
     They would be averaged with those of now: a label is one policy, and a setting is run one way.
     """
-    names = ("settings",) if any_version else ("settings", "versions")
-    policies: dict[str, str] = {}
+    names = ("settings", "data") if any_version else ("settings", "data", "versions")
+    first = {job.policy.label: job for job in jobs}
     ways: dict[tuple[str, str], list[Any]] = {}
     for job in jobs:
         assert job.spec is not None
-        policies[job.policy.label] = job.spec["policy"]["identity"]
         setting = job.policy.label, setting_of(*job.key[1:])
-        ways[setting] = [job.spec[name] for name in names]
-    hidden = []
+        ways[setting] = [job.spec.get(name) for name in names]
+    outdated = []
     for one in stored:
         if not one.spec:  # saved from a CSV file, which does not say how it came about
             continue
         row = one.row
-        identity = one.spec.get("policy", {}).get("identity")
+        asked = first.get(row.policy)
         way = [one.spec.get(name) for name in names]
-        changed = row.job in outdated or policies.get(row.policy, identity) != identity
+        changed = asked and _policy(asked, one.spec) != _policy(asked, asked.spec or {})
         if changed or ways.get((row.policy, setting_of(row.scenario, row.seed)), way) != way:
-            hidden.append(row.job)
-    store.hide(hidden)
+            outdated.append(row.job)
+    store.hide(outdated)
+
+
+def _policy(job: Job, spec: Mapping[str, Any]) -> tuple[object, object]:
+    """The code of a job's policy and, if that is a user's, what it has read, by a specification."""
+    data = spec.get("data") if job.policy.group else None
+    return spec.get("policy", {}).get("identity"), data
