@@ -1,6 +1,8 @@
 """The compiled core: its sources, its types, and what a tree without it says."""
 
 import ast
+import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -31,6 +33,23 @@ def test_changed_sources_are_noticed(
     assert "core: core/ has changed since" in capsys.readouterr().out
     (tmp_path / "core/src/other.cpp").unlink()
     assert not core.is_stale()  # an installed package has no sources beside it
+
+
+@pytest.mark.parametrize("name", ["CMakeLists.txt", "core/CMakeLists.txt"])
+def test_options_of_the_compiler_are_among_its_sources(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copytree(ROOT / "core", tmp_path / "core")
+    shutil.copy(ROOT / "CMakeLists.txt", tmp_path)
+    monkeypatch.setattr(core, "__file__", str(tmp_path / "pushplan/core.py"))
+    assert not core.is_stale()
+    with (tmp_path / name).open("a") as file:
+        file.write("add_compile_options(-O1)\n")
+    assert core.is_stale()
+
+
+def test_options_that_the_user_of_cmake_chooses_are_named() -> None:
+    assert re.fullmatch(r"\S+ [\d.]+, OSQP [\d.]+, [^,]*-[^,]*, [^,]*-[^,]*", core.COMPILER)
 
 
 def test_a_tree_without_it_says_so_in_one_line() -> None:

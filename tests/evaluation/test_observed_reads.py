@@ -190,6 +190,22 @@ def test_products_and_what_belongs_to_the_system_do_not_count(
         assert not [one.spec["read"] for one in read_results(db) if "read" in one.spec]
 
 
+class OtherScenario(LineScenario):
+    @property
+    def key(self) -> str:
+        return f"other-{self.seed}"
+
+
+def test_old_results_of_other_settings_count_no_more(tmp_path: Path) -> None:
+    """A label is one policy, and what it reads belongs to it."""
+    spec = parse_policy(policy(tmp_path / "own", **KINDS["open in the constructor"]))
+    jobs = [Job(spec, LineScenario(0)), Job(spec, OtherScenario(0))]
+    options: dict[str, Any] = {"out": tmp_path / "run", "workers": 0, "settings": SETTINGS}
+    assert len(run_batch(jobs, **options)) == 2
+    write(tmp_path / "own", 0.004)
+    assert [row.scenario for row in run_batch(jobs[1:], **options)] == ["other-0"]
+
+
 def test_it_may_be_moved_with_its_files(tmp_path: Path) -> None:
     source = policy(tmp_path / "own", **KINDS["open in the constructor"])
     _, first = Batch(source, tmp_path / "run")()
