@@ -6,6 +6,7 @@ import json
 import shutil
 import sqlite3
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -167,7 +168,7 @@ def test_a_file_that_is_missing_counts(change: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "make",
+    "made",
     [
         # what it makes itself, or another program does for it
         "(FOLDER / 'log').open('a').write('x'); (FOLDER / 'log').read_text()",
@@ -180,9 +181,9 @@ def test_a_file_that_is_missing_counts(change: str, tmp_path: Path) -> None:
     ],
 )
 def test_products_and_what_belongs_to_the_system_do_not_count(
-    make: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    made: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    run = Batch(policy(tmp_path / "own", make=make, reset=make), tmp_path / "run")
+    run = Batch(policy(tmp_path / "own", reset=made), tmp_path / "run")
     _, first = run()
     monkeypatch.setenv("OWN_OTHER", "1")
     assert run() == (0, first)
@@ -297,6 +298,9 @@ def test_files_of_robots_and_tasks_count_and_what_they_read(tmp_path: Path) -> N
     assert ran() == 6
     assert ran() == 0
     (tmp_path / "mass").write_text("6.0")
+    run_batch([Job(policies[0], replace(own, seed=1))], out=tmp_path / "run", workers=0)
+    shown = [row for row in Results.load(tmp_path / "run").rows if row.policy == "straight"]
+    assert sorted(row.seed for row in shown if row.task == "maze") == [1, 1]  # with ours
     assert ran() == 2
     for name in ("robot.py", "task.py"):
         with (tmp_path / name).open("a") as file:
