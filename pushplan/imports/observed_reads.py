@@ -33,7 +33,7 @@ _imported: set[str] = set()  # modules
 _read: Reads = {}  # everything, for modules may hold it
 _environment_item = os._Environ.__getitem__
 kept: Reads = {}
-"""Reads that serve later jobs, too: of modules while they were loaded, and of dry runs."""
+"""Reads of modules while they were loaded, which serve every job of this process."""
 
 
 def version(name: str | Path) -> object:
