@@ -211,7 +211,10 @@ def test_it_may_be_moved_with_its_files(tmp_path: Path) -> None:
     source = policy(tmp_path / "own", **KINDS["open in the constructor"])
     _, first = Batch(source, tmp_path / "run")()
     moved = shutil.move(tmp_path / "own", tmp_path / "elsewhere")
-    assert Batch(f"{moved}/mine.py:Mine", tmp_path / "run")() == (0, first)
+    run = Batch(f"{moved}/mine.py:Mine", tmp_path / "run")
+    assert run() == (0, first)
+    write(moved, 0.004)
+    assert run()[0] == 2
 
 
 def test_processes_see_the_same_and_store_the_same(tmp_path: Path) -> None:

@@ -32,7 +32,7 @@ from pushplan.world import InvalidInputError
 from pushplan.world.stored.robots import robots
 
 _MOST_DIFFERENCES = 4
-_WORKERS_OWN = [f"${name}" for name in (*THREAD_VARIABLES, WORKER_VARIABLE, "PYTHONUNBUFFERED")]
+_WORKERS_OWN = {f"${name}" for name in (*THREAD_VARIABLES, WORKER_VARIABLE, "PYTHONUNBUFFERED")}
 _OF_SB3 = {"stable_baselines3", "torch"}
 _OURS = "pushplan."
 
@@ -72,7 +72,8 @@ def read_by(job: Job, reads: Reads) -> dict[str, str]:
     if not job.policy.group and not any(name.endswith(".py") for name in counted):
         return {}
     folder = source_folder(job.policy.source)
-    names = [name for name in reads if name not in {*counted, *_WORKERS_OWN}]
+    left_out = counted | _WORKERS_OWN
+    names = [name for name in reads if name not in left_out]
     if folder:
         names = [name.removeprefix(os.path.join(folder, "")) for name in names]
     return read_digests(names[:MOST_READS], folder)

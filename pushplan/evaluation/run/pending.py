@@ -101,7 +101,7 @@ def _with_data(jobs: Sequence[Job], stored: Sequence[StoredResult]) -> list[Job]
     groups: dict[str, dict[str, dict[str, str]]] = {}  # code of users -> data -> what was read
     for one in stored:
         job = first.get(one.row.policy)
-        if job is None or job.spec is None or job.spec["policy"] != one.spec.get("policy"):
+        if job is None or _identity(job.spec) != _identity(one.spec):
             continue
         data = json.dumps(one.spec.get("data", {}))
         group = groups.setdefault(_users_code(job, one.spec), {})
@@ -159,5 +159,8 @@ def _hide_outdated(
 
 def _policy(job: Job, spec: Mapping[str, Any]) -> tuple[object, object]:
     """The code of a job's policy and, if that is a user's, what it has read, by a specification."""
-    data = spec.get("data") if job.policy.group else None
-    return spec.get("policy", {}).get("identity"), data
+    return _identity(spec), spec.get("data") if job.policy.group else None
+
+
+def _identity(spec: Mapping[str, Any] | None) -> object:
+    return (spec or {}).get("policy", {}).get("identity")

@@ -62,9 +62,9 @@ def read_digests(names: Iterable[str], folder: str) -> dict[str, str]:
         found[name] = ""
         with contextlib.suppress(OSError, ValueError):
             file = Path(folder, name)
-            if not name.startswith("$") and file.is_file():
-                found[name] = _content_hash(file, version(file))
-            elif (value := os.environ.get(name.removeprefix("$"))) is not None:
+            if not name.startswith("$"):
+                found[name] = _content_hash(file, version(file)) if file.is_file() else ""
+            elif (value := os.environ.get(name[1:])) is not None:
                 found[name] = hashlib.sha256(os.fsencode(value)).hexdigest()[:12]
     return found
 
