@@ -130,8 +130,8 @@ def _use_folder(folder: str) -> None:
 
 
 @contextlib.contextmanager
-def _fresh_modules() -> Iterator[None]:
-    """Import all of a user's modules again if one, or what they have read, has been edited."""
+def fresh_modules() -> Iterator[None]:
+    """Observe imports of a user's modules: all anew if one, or what they read, has been edited."""
     if has_changed():
         forget_modules()
     with observing(kept):
@@ -153,7 +153,7 @@ def _callables_of(module: ModuleType) -> dict[str, Any]:
 def _load_module(name: str, spec: str) -> ModuleType:
     is_ours = name.partition(".")[0] == "pushplan"
     try:
-        with contextlib.nullcontext() if is_ours else _fresh_modules():
+        with contextlib.nullcontext() if is_ours else fresh_modules():
             return importlib.import_module(name)
     except ModuleNotFoundError as error:
         if error.name is None or not f"{name}.".startswith(f"{error.name}."):
@@ -170,7 +170,7 @@ def _load_file(path: Path) -> ModuleType:
     # files in two folders may share a name, and an edited one is another module
     digest = hashlib.sha256(str(path).encode() + b"\0" + source).hexdigest()[:8]
     name = f"{PREFIX}{path.stem}_{digest}"
-    with _loading, _fresh_modules():
+    with _loading, fresh_modules():
         if name in sys.modules:
             return sys.modules[name]
         spec = importlib.util.spec_from_file_location(name, path)

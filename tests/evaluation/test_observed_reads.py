@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from evaluation_doubles import HERE, LineScenario
 
-from pushplan.evaluation import Job, JobSettings, Results, parse_policy, run_batch
+from pushplan.evaluation import Job, JobSettings, Results, parse_policy, reproduce, run_batch
 from pushplan.evaluation.run.execute import execute
 from pushplan.evaluation.run.job_identity import job_spec
 from pushplan.evaluation.store.database import read_results, reading
@@ -310,6 +310,10 @@ def test_files_of_robots_and_tasks_count_and_what_they_read(tmp_path: Path) -> N
             file.write("# edited\n")
         assert ran() == 2, name
     assert ran() == 0
+    (tmp_path / "mass").write_text("5.0")
+    (row,) = [one for one in Results.load(tmp_path / "run").rows if one.scenario == own.key][:1]
+    again = reproduce(tmp_path / "run", row.job)
+    assert again.changed.startswith(f"read {tmp_path}/mass ")
 
 
 TASK = """

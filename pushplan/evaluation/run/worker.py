@@ -22,7 +22,7 @@ from typing import Any
 
 from pushplan.errors import describe
 from pushplan.evaluation.run.job_limits import limit_memory
-from pushplan.imports.observed_reads import kept, observing
+from pushplan.imports.named_objects import fresh_modules
 from pushplan.world import InvalidInputError
 
 _DIE_WITH_OWNER = 1  # PR_SET_PDEATHSIG of Linux, however the owner ends
@@ -87,7 +87,7 @@ def _answer(lines: BufferedRWPair, payload: bytes, setup: WorkerSetup) -> bool:
         if setup.trace_after_s is not None:
             faulthandler.dump_traceback_later(setup.trace_after_s)
         try:
-            with observing(kept):
+            with fresh_modules():
                 if b"__main__" in payload and setup.main is not None:
                     _import_main(setup.main)
                 job, settings = pickle.loads(payload)
