@@ -128,8 +128,8 @@ class ScoreSheet:
             (*headings, "without success", "missed"),
             tuple(cells),
             "success with its Wilson 95 % interval; kept is the mean over that of the undisturbed "
-            "episodes with the same seeds; n: episodes with the score, if not all: failed ones have "
-            "E = 0, but no I, which may look better for it",
+            "episodes with the same seeds; n: episodes with the score, if not all; failed ones "
+            "have E = 0, but no I, which may look better for it",
         )
 
 

@@ -150,12 +150,14 @@ def test_what_a_cut_study_lacks_is_said(tmp_path: Path) -> None:
     assert [line[1] for line in table.cells] == ["2", "1 of 2"] and RUNS_NOTE in table.note
 
 
-def test_the_cost_counts_results_that_are_not_shown(tmp_path: Path) -> None:
+def test_the_cost_counts_stored_results_as_the_run_does(tmp_path: Path) -> None:
     data = {"schema": "pushplan-experiment/1", "suites": ["maze-2d-3"], "policies": ["straight"]}
-    large = Experiment.from_dict({**data, "episodes": 3})
-    large.run(tmp_path, workers=0)
-    Experiment.from_dict({**data, "episodes": 1}).run(tmp_path, workers=0)
-    assert large.cost(tmp_path).new == 0
+    first = Experiment.from_dict({**data, "episodes": 3, "timeout_s": 60})
+    first.run(tmp_path, workers=0)
+    Experiment.from_dict({**data, "episodes": 1, "timeout_s": 50}).run(tmp_path, workers=0)
+    assert first.cost(tmp_path).new == 0  # they are stored, though they do not count now
+    other = Experiment.from_dict({**data, "episodes": 1, "timeout_s": 40})
+    assert other.cost(tmp_path, any_version=True).new == 1  # it differs in more than versions
 
 
 # failed runs
