@@ -246,6 +246,25 @@ def test_a_stress_test_says_over_how_many_episodes_a_mean_is() -> None:
     assert "failed ones have E = 0, but no I" in table.note
 
 
+def test_figures_draw_the_means_of_the_tables_and_name_failures() -> None:
+    results = Results(crashing())
+    crash, _ = results.summary()
+    axes, *_ = results.figure("tradeoff").axes
+    handles, labels = axes.get_legend_handles_labels()
+    (place,) = (
+        one.lines[0].get_xydata()[0]
+        for one, label in zip(handles, labels, strict=True)
+        if label == "crash (4 failed)"
+    )
+    assert place.tolist() == [crash.metrics["I_nav"].mean, crash.metrics["E_nav"].mean]
+    for name in ("profiles", "intervals"):
+        figure = results.figure(name)
+        ticks = [tick.get_text() for tick in figure.axes[0].get_yticklabels()]
+        named = [*ticks, *figure.axes[0].get_legend_handles_labels()[1]]
+        assert "crash (4 failed)" in [one.replace("\n", " ") for one in named]
+    assert "sure" in labels
+
+
 # intervals
 
 
