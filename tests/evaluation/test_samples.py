@@ -184,6 +184,11 @@ def test_no_crash_improves_a_mean_unmarked() -> None:
     assert RUNS_NOTE not in Results(tuple(r for r in results.rows if r.policy == "sure")).table()
 
 
+def test_a_policy_of_which_every_run_fails_has_the_note_too() -> None:
+    (table, *_) = Results(tuple(row("crash", seed, failed=True) for seed in range(3))).tables()
+    assert table.cells[0][1] == "3\n3 failed" and RUNS_NOTE in table.note
+
+
 def test_sums_up_to_a_failure_are_in_no_mean() -> None:
     found, _ = Results(crashing()).summary()
     assert (found.policy, found.failed) == ("crash", 4)

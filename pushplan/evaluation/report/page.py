@@ -51,13 +51,11 @@ def write_page(
     from markupsafe import Markup
 
     rows = [] if replays == "none" else chosen(run, most)
-    texts: list[str] = []
-    there: dict[str, int] = {}
+    texts: dict[str, str] = {}
     if replays == "embed":
-        found = {row.job: text for row in rows if (text := packed(run, row)) is not None}
-        texts = list(found.values())
-        there = dict.fromkeys(found, 1)
-    elif replays == "beside":
+        texts = {row.job: text for row in rows if (text := packed(run, row)) is not None}
+    there = dict.fromkeys(texts, 1)
+    if replays == "beside":
         there = dict.fromkeys(write_beside(run, rows, folder), 2)
     pairs = [table for table in tables if table.title.startswith("Paired")]
     configuration = run.about.get("configuration", {})
@@ -82,7 +80,7 @@ def write_page(
         sources=[(k, v) for k in run.policies if (v := sources.get(k, k)) != k],
         runs=[in_words(one) for one in run.about.get("runs", ())],
         data=Markup(_escaped(json.dumps(page_data(run, there), separators=(",", ":")))),
-        replays=[Markup(_escaped(one)) for one in texts],
+        replays=[Markup(_escaped(one)) for one in texts.values()],
     )
     path = folder / PAGE
     write_atomic(path, text.encode())

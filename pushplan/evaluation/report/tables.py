@@ -67,15 +67,13 @@ SCORE_NOTE = (
     "below; step is the same for the time from world to action, without simulation"
 )
 RUNS_NOTE = (
-    "n: runs that the value is from, if not all of the row or table; runs '3 of 5': of 5 starts "
-    "that policies of the table ran; this one may not fit the others, was not asked for there, or "
-    "has to run there yet, so compare it by paired differences; a failed run has no success and "
+    "n: runs behind a value, if not all; runs '3 of 5': the policy does not fit 2 starts of the "
+    "table, was not asked for there, or has to run there yet; a failed run has no success and "
     "E_nav, E_manip, S_manip = 0, but no I_nav, I_manip, path, work, wall time and further "
-    "metrics: these are of the other runs alone and may look better for it; runs of one world file "
-    "that all drive alike are one"
+    "metrics: these are of the other runs and may look better for it; runs of one world file that "
+    "all drive alike are one"
 )
-"""Of tables in which numbers of runs differ."""
-_FEWER = re.compile(r"\nn = |^\d+ of \d+$", re.MULTILINE)
+_FEWER = re.compile(r"\nn = |^\d+ (of \d+|failed)$", re.MULTILINE)
 MEASURED_NOTE = (
     "mean ± standard deviation over episodes, 95 % bootstrap interval of the mean below; med is "
     "the median"
@@ -157,7 +155,7 @@ def of_runs(count: int, runs: int) -> str:
 
 
 def _noted(table: Table) -> Table:
-    """The table, with `RUNS_NOTE` if a cell says how many runs it is from."""
+    """The table, with `RUNS_NOTE` if runs failed or a cell says how many it is from."""
     if any(_FEWER.search(cell) for row in table.cells for cell in row):
         table = replace(table, note=f"{table.note}; {RUNS_NOTE}")
     return table

@@ -68,8 +68,8 @@ class StoredRun:
             lines.append(f"{jobs - len(self.rows)} of {jobs} jobs have no result yet")
         if others := self.about.get("left_out"):
             listed = ", ".join(f"{count} of {policy}" for policy, count in others.items())
-            where = f"{self.path} also holds results that the last command did not ask for"
-            lines.append(f"{where}: {listed}; a command that asks for them shows them")
+            what = f"results that the last command did not ask for: {listed}"
+            lines.append(f"{self.path} also holds {what}; a command that asks for them shows them")
         return lines
 
     @functools.cached_property

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,7 +35,6 @@ TIMINGS = (
     "decision_time_max_s",
     "wall_time_s",
 )
-
 SUMMARISED = (*metric_names(Role.SCORE, Role.DETAIL, Role.FACT), *TIMINGS)
 _WORLDS = "room"
 """Task of the worlds of files."""
@@ -120,7 +119,7 @@ def summarise(
     Args:
         rows: of a run.
         order: labels in the order in which policies are shown; others follow by name.
-        metrics: columns, or names of what the rows have as metrics.
+        metrics: columns, or other names among the rows' metrics.
     """
     starts = Counter(key[0] for key in {(row.setting, row.scenario, row.seed) for row in rows})
     found = []
@@ -226,15 +225,17 @@ def values_of(rows: Sequence[ResultRow], metric: str) -> list[float]:
     Empty fields are left out, and a failed run's sums up to its failure, such as its time. Runs of
     one world file that all drive alike are one run, except for what times they took.
     """
-    found = [value for row in rows if (value := _value(row, metric)) is not None]
+    found = [value for _, value in _valued(rows, metric)]
     if metric in TIMINGS or not rows or rows[0].task != _WORLDS:
         return found
     return found if len(set(map(_drive, rows))) > 1 else found[:1]
 
 
-def _value(row: ResultRow, metric: str) -> float | None:
-    value = row.metrics.get(metric, getattr(row, metric, None))
-    return None if value is None or (row.failed and metric in _SUMS) else float(value)
+def _valued(rows: Sequence[ResultRow], metric: str) -> Iterator[tuple[ResultRow, float]]:
+    for row in rows:
+        value = row.metrics.get(metric, getattr(row, metric, None))
+        if value is not None and not (row.failed and metric in _SUMS):
+            yield row, float(value)
 
 
 def _drive(row: ResultRow) -> object:
@@ -249,11 +250,7 @@ def _drive(row: ResultRow) -> object:
 
 def by_scenario(rows: Sequence[ResultRow], metric: str) -> dict[tuple[str, int], float]:
     """Scenario and seed -> value of a column, without empty fields and sums up to a failure."""
-    return {
-        (row.scenario, row.seed): value
-        for row in rows
-        if (value := _value(row, metric)) is not None
-    }
+    return {(row.scenario, row.seed): value for row, value in _valued(rows, metric)}
 
 
 def settings_of(rows: Sequence[ResultRow]) -> list[str]:
