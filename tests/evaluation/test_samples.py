@@ -150,6 +150,21 @@ def test_what_a_cut_study_lacks_is_said(tmp_path: Path) -> None:
     assert [line[1] for line in table.cells] == ["2", "1 of 2"] and RUNS_NOTE in table.note
 
 
+def test_a_study_cut_before_its_first_result_hides_the_others_but_names_them(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def stop(done: int, total: int, one: ResultRow | None) -> None:
+        raise KeyboardInterrupt
+
+    batch(tmp_path, "Ahead", range(2))
+    with pytest.raises(KeyboardInterrupt):
+        batch(tmp_path, "Logs", range(4), progress=stop)
+    assert main(["report", str(tmp_path)]) == 0
+    said = capsys.readouterr().out
+    assert "4 of 4 jobs have no result yet" in said and "2 of Ahead" in said
+    assert runs(batch(tmp_path, "Ahead", range(2))) == {"Ahead": 2}
+
+
 def test_the_cost_counts_stored_results_as_the_run_does(tmp_path: Path) -> None:
     data = {"schema": "pushplan-experiment/1", "suites": ["maze-2d-3"], "policies": ["straight"]}
     first = Experiment.from_dict({**data, "episodes": 3, "timeout_s": 60})
