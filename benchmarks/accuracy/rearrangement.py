@@ -350,7 +350,8 @@ def difference(pairs: Sequence[Sequence[float]] | FloatArray) -> str:
         return ""
     gaps = np.asarray(pairs, float)
     found = estimate(gaps[:, 0] - gaps[:, 1])
-    return f"{found.mean:+.3f} ({found.low:+.3f} to {found.high:+.3f})"
+    interval = f" ({found.low:+.3f} to {found.high:+.3f})" if found.count > 1 else ""
+    return f"{found.mean:+.3f}{interval}"
 
 
 if __name__ == "__main__":

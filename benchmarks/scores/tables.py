@@ -295,7 +295,8 @@ def _mean(value: Estimate, metric: str, sign: str = "") -> str:
         return "0"
     known = METRICS[metric]
     form = sign + (".3g" if known.role in (Role.DETAIL, Role.FACT) else f".{known.digits}f")
-    return f"{value.mean:{form}} [{value.low:{form}}, {value.high:{form}}]"
+    interval = f" [{value.low:{form}}, {value.high:{form}}]" if value.count > 1 else ""
+    return f"{value.mean:{form}}{interval}"
 
 
 def _times(rows: Sequence[ResultRow], name: str) -> str:

@@ -34,6 +34,7 @@ def run(options: argparse.Namespace) -> int:
         tables = results.measure(options.metrics)
     else:
         tables = results.tables(settings=options.settings, pairs=options.pairs)
+    sys.stderr.writelines(f"{line}\n" for line in results.remarks)
     if options.json:
         say_json(tables)
     elif options.format is None:
@@ -55,7 +56,7 @@ def show(results: Results, options: argparse.Namespace, **written: Any) -> None:
 
     tables = results.tables(settings=options.settings, pairs=options.pairs)
     _print(on_few_lines(tables))
-    for line in _unsuccessful_lines(results):
+    for line in [*_unsuccessful_lines(results), *results.remarks]:
         say(line)
     if len(results.titles) > 1 and not options.settings:
         say(f"each of the {len(results.titles)} settings: --settings, and on the page")
@@ -75,7 +76,8 @@ def show_json(results: Results, options: argparse.Namespace, **written: Any) -> 
     ]
     compared = [one for run in runs for one in run.compare(pairs)]
     differences = [{**asdict(one), "verdict": one.verdict} for one in compared]
-    say_json({"page": str(page), "policies": summaries, "differences": differences})
+    found = {"page": str(page), "policies": summaries, "differences": differences}
+    say_json({**found, "remarks": results.remarks})
 
 
 def exit_code(results: Results) -> int:
@@ -123,12 +125,9 @@ def _print(tables: Sequence[Table]) -> None:
     """In colour and to the width of a terminal, or as plain text."""
     from rich.console import Console
 
-    from pushplan.evaluation.report.table_formats import rich_table, text
+    from pushplan.evaluation.report.table_formats import print_tables, text
 
-    if not sys.stdout.isatty():
+    if sys.stdout.isatty():
+        print_tables(tables, Console())
+    else:
         say(text(tables))
-        return
-    console = Console()
-    for table in tables:
-        console.print(rich_table(table))
-        console.print()

@@ -102,7 +102,7 @@ def _score(config: TrainingConfig, path: Path, options: argparse.Namespace) -> P
             "success_low": found.success.low,
             "success_high": found.success.high,
             "scores": {
-                name: (one.mean, one.low, one.high)
+                name: (one.mean, one.low, one.high)[: 3 if one.count > 1 else 1]
                 for name in ("S_manip", "E_manip", "I_manip", "E_nav", "I_nav")
                 if (one := found.metrics.get(name)) is not None
             },

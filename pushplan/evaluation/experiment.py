@@ -19,11 +19,11 @@ from pushplan.evaluation.run.compatibility import is_wanted, misfits
 from pushplan.evaluation.run.job_identity import identified
 from pushplan.evaluation.run.job_limits import MEMORY_MB
 from pushplan.evaluation.run.jobs import Job, JobSettings
+from pushplan.evaluation.run.pending import sorted_out
 from pushplan.evaluation.run.policy_specs import PolicySpec, parse_policies
-from pushplan.evaluation.store.database import DATABASE
+from pushplan.evaluation.store.database import DATABASE, read_results, reading
 from pushplan.evaluation.store.rescoring import rescore
 from pushplan.evaluation.store.rows import setting_of
-from pushplan.evaluation.store.run_directory import open_results
 from pushplan.files.safe_files import read_data
 from pushplan.metrics import metric_function
 from pushplan.scenarios.suite import Suite, distinct
@@ -170,14 +170,14 @@ class Experiment:
         """
         out = Path(out)
         jobs = self._part(shard)
-        rows = []
+        stored = []
         if (out / DATABASE).is_file():
-            rows = open_results(out)[0]
+            with reading(out) as db:
+                stored = read_results(db)
             jobs = identified(jobs, self.settings)  # which takes a while where there are many
-        kept = [row for row in rows if not (retry_failed and row.failed)]
-        done = {row.job for row in kept}
-        keys = {(row.policy, row.scenario, row.seed) for row in kept if any_version}
-        new = [job for job in jobs if job.id not in done and job.key not in keys]
+        kept = [one for one in stored if not (retry_failed and one.row.failed)]
+        _, new = sorted_out(jobs, kept, any_version)
+        rows = [one.row for one in stored]
         times: dict[Hashable, list[float]] = {}
         for row in rows:
             for key in ((row.policy, row.setting), row.policy, None):
@@ -220,7 +220,8 @@ class Experiment:
     ) -> Results:
         """Run what has not been run yet in the run directory ``out``; see `run_batch`.
 
-        Suites, policies and episodes may be added to an experiment that was run before.
+        Suites, policies and episodes may be added to an experiment that was run before, or left
+        out: results that are not asked for stay stored.
 
         Args:
             out: run directory; if None only the rows are kept, and traces are dropped.
@@ -233,7 +234,7 @@ class Experiment:
             progress: told of every row.
 
         Returns:
-            All rows of the run directory.
+            The results of these jobs.
         """
         with ExitStack() as stack:
             temporary = stack.enter_context(tempfile.TemporaryDirectory(prefix="pushplan-"))

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from pushplan.evaluation.benchmark import suites_of
-from pushplan.evaluation.report.tables import Table, heading
+from pushplan.evaluation.report.tables import Table, heading, of_runs
 from pushplan.evaluation.run.batch import Progress, run_batch
 from pushplan.evaluation.run.compatibility import misfits
 from pushplan.evaluation.run.jobs import Job, JobSettings
@@ -80,6 +80,8 @@ class StressRow:
         scores: mean of each score that there is.
         kept: each score over that of the undisturbed episodes with the same seeds.
         missed: what was asked for and not reached, in words.
+        counts: episodes behind the mean of each score: those that have it, as have the undisturbed
+            ones with the same seeds. Failed ones have no I_nav and I_manip.
     """
 
     condition: str
@@ -89,6 +91,7 @@ class StressRow:
     scores: Mapping[str, float]
     kept: Mapping[str, float]
     missed: tuple[str, ...]
+    counts: Mapping[str, int]
 
 
 @dataclass(frozen=True)
@@ -115,7 +118,8 @@ class ScoreSheet:
             rate = wilson(row.successes, row.episodes)
             line = [row.condition, f"{rate.fraction:.2f} [{rate.low:.2f}, {rate.high:.2f}]"]
             for name in names:
-                line.append(f"{row.scores[name]:.3f}" if name in row.scores else "")
+                of = of_runs(row.counts.get(name, 0), row.episodes)
+                line.append(f"{row.scores[name]:.3f}{of}" if name in row.scores else "")
                 line.append(f"{row.kept[name]:.2f}" if name in row.kept else "")
             ends = ", ".join(f"{count} {reason}" for reason, count in row.ends.items())
             cells.append((*line, ends, "; ".join(row.missed)))
@@ -124,7 +128,8 @@ class ScoreSheet:
             (*headings, "without success", "missed"),
             tuple(cells),
             "success with its Wilson 95 % interval; kept is the mean over that of the undisturbed "
-            "episodes with the same seeds",
+            "episodes with the same seeds; n: episodes with the score, if not all; failed ones "
+            "have E = 0, but no I, which may look better for it",
         )
 
 
@@ -200,11 +205,7 @@ def stress(
             settings=JobSettings(timeout_s=timeout_s),
             progress=progress,
         )
-    asked = {job.key for job in jobs}  # the folder may hold other tests
-    found: dict[str, list[ResultRow]] = {label: [] for label in wanted}
-    for row in rows:
-        if (row.policy, row.scenario, row.seed) in asked:
-            found[row.policy].append(row)
+    found = {label: [row for row in rows if row.policy == label] for label in wanted}
     calm = {row.seed: row for row in found[UNDISTURBED]}
     judged = (_judged(label, one, found[label], calm) for label, one in wanted.items())
     return ScoreSheet(spec.label, name, tuple(judged))
@@ -245,11 +246,13 @@ def _judged(
 ) -> StressRow:
     """The outcome of a condition; ``calm`` are the undisturbed episodes by their seeds."""
     scores = {}
+    counts = {}
     kept = {}
     for score in metric_names(Role.SCORE):
         pairs = [(getattr(row, score), getattr(calm[row.seed], score)) for row in rows]
         pairs = [pair for pair in pairs if None not in pair]
         if pairs:
+            counts[score] = len(pairs)
             scores[score], before = np.mean(pairs, axis=0).tolist()
             if before > 0.0:
                 kept[score] = scores[score] / before
@@ -263,5 +266,5 @@ def _judged(
     for score, part in kept.items():
         if part < condition.kept:
             missed.append(f"{score} kept ≥ {condition.kept:g}")
-    counts = dict(ends.most_common())
-    return StressRow(name, len(rows), successes, counts, scores, kept, tuple(missed))
+    listed = dict(ends.most_common())
+    return StressRow(name, len(rows), successes, listed, scores, kept, tuple(missed), counts)

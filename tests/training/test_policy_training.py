@@ -671,12 +671,12 @@ class TestCard:
             "success": 0.93,
             "success_low": 0.86,
             "success_high": 0.97,
-            "scores": {"E_nav": (0.8, 0.78, 0.82)},
+            "scores": {"E_nav": (0.8, 0.78, 0.82), "I_nav": (0.9,)},
             "failures": {"wall": 7},
         }
         text = write_card(tmp_path, [scores], tmp_path / "MODEL_CARD.md").read_text()
         for part in (
-            "| maze-2d-3 | 100 | 0.930 [0.860, 0.970] | 0.800 [0.780, 0.820] |",
+            "| maze-2d-3 | 100 | 0.930 [0.860, 0.970] | 0.800 [0.780, 0.820] | 0.900 |",
             "wall 7 of 100 episodes",
             "3 episodes of `straight`",
             "pushplan train bc ...",

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import csv
-import itertools
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,7 @@ import numpy as np
 from pushplan.errors import describe, short
 from pushplan.evaluation.report.tables import Table
 from pushplan.evaluation.statistics.estimates import ENOUGH, estimate, pairs_needed
-from pushplan.evaluation.statistics.summary import by_scenario, grouped, policies_of, settings_of
+from pushplan.evaluation.statistics.summary import by_scenario, grouped
 from pushplan.evaluation.store.rows import (
     ResultRow,
     column_type,
@@ -33,11 +32,12 @@ SHORT = {
     "wall_time": "wall_time_s",
 }
 """Further names of columns in rules."""
-_RULE = re.compile(r"\s*([A-Za-z_0-9]+)\s*([<>])\s*([+-]?[0-9.]+(?:e[+-]?[0-9]+)?)\s*(%?)\s*")
+_RULE = re.compile(r"\s*(\w+)\s*([<>])\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)\s*(%?)\s*")
 NOTE = (
     "change is new minus old, scenario by scenario where both ran it, else between the means, with "
     "its 95 % interval; regressed: the whole interval is beyond the rule's bound; ok: no part of "
     f"it; unclear: the bound is within, or there are fewer than {ENOUGH} scenarios and a difference"
+    "; '3 of 5' scenarios: in the others the new run did not start, or a job of either failed"
 )
 
 
@@ -77,10 +77,11 @@ class Verdict:
         old: mean before.
         new: mean now; NaN if the new run has no such values.
         change: new minus old, divided by the old mean for a relative rule.
-        low: lower end of its 95 % interval.
-        high: upper end.
+        low: lower end of its 95 % interval; minus infinity for one scenario that changed.
+        high: upper end; infinity for one scenario that changed.
         verdict: ``"ok"``, ``"regressed"``, ``"unclear"`` or ``"missing"``.
         needed: scenarios that would separate the two, if it is unclear and a number would.
+        known: scenarios that the policy ran in the setting of the old run.
     """
 
     rule: Rule
@@ -95,6 +96,7 @@ class Verdict:
     high: float
     verdict: str
     needed: int | None = None
+    known: int = 0
 
     @property
     def failed(self) -> bool:
@@ -121,10 +123,7 @@ def read_rules(text: str) -> list[Rule]:
         metric = SHORT.get(name, name)
         if metric not in numbers:
             raise UnknownNameError("column", name, [*numbers, *SHORT])
-        try:
-            value = float(bound)
-        except ValueError:
-            value = math.nan
+        value = float(bound)
         if not math.isfinite(value):
             raise InvalidInputError(f"{bound!r} in rule {short(part)} is no finite number")
         unit = 100.0 if percent else 1.0
@@ -151,18 +150,16 @@ def compare_runs(old: str | Path, new: str | Path, rules: str | Sequence[Rule]) 
         UnknownNameError: if there is no such column.
     """
     chosen = read_rules(rules) if isinstance(rules, str) else rules
-    before = _read(old)
-    after = _read(new)
+    before = grouped(_read(old))
+    after = grouped(_read(new))
     found = []
-    old_rows = grouped(before)
-    new_rows = grouped(after)
-    for setting, policy in itertools.product(settings_of(before), policies_of(before)):
-        mine = setting, policy
+    for (setting, policy), rows in before.items():
         for rule in chosen:
-            one = by_scenario(old_rows.get(mine, []), rule.metric)
-            two = by_scenario(new_rows.get(mine, []), rule.metric)
+            one = by_scenario(rows, rule.metric)
+            two = by_scenario(after.get((setting, policy), []), rule.metric)
             if one:
-                found.append(_judge(rule, policy, setting, one, two))
+                judged = _judge(rule, policy, setting, one, two)
+                found.append(replace(judged, known=len(rows)))
     if not found:
         names = ", ".join(sorted({rule.metric for rule in chosen}))
         raise InvalidInputError(f"{old} has no values of {names}: nothing can be compared")
@@ -176,10 +173,12 @@ def verdict_table(verdicts: Sequence[Verdict]) -> Table:
         scale, unit = (100.0, " %") if one.rule.relative else (1.0, "")
         change = ""
         if not math.isnan(one.change):
-            interval = f"[{scale * one.low:+.3g}, {scale * one.high:+.3g}]"
-            change = f"{scale * one.change:+.3g}{unit}\n{interval}"
+            change = f"{scale * one.change:+.3g}{unit}"
+            if one.count > 1:
+                change += f"\n[{scale * one.low:+.3g}, {scale * one.high:+.3g}]"
         more = f"\n{one.needed} needed" if one.needed else ""
-        count = f"{one.count}" + ("" if one.paired else "\nnot paired")
+        count = f"{one.count}" if one.count == one.known else f"{one.count} of {one.known}"
+        count += "" if one.paired else "\nnot paired"
         means = [f"{value:.4g}" for value in (one.old, one.new)]
         cells.append((str(one.rule), one.policy, *means, change, count, one.verdict + more))
     headings = ("rule", "policy", "old", "new", "change", "scenarios", "verdict")
@@ -204,16 +203,16 @@ def _judge(
     unit = abs(float(old.mean())) if rule.relative else 1.0
     gaps = (new - old if paired else np.array([new.mean() - old.mean()])) / (unit or 1.0)
     change = float(gaps.mean())
-    if paired:
+    if paired and count > 1:
         found = estimate(gaps)
         low = found.low
         high = found.high
+    elif (paired and change == 0.0) or (count > 1 and np.ptp(old) == np.ptp(new) == 0.0):
+        low = change
+        high = change
     elif count < 2:
         low = -math.inf
         high = math.inf
-    elif np.ptp(old) == np.ptp(new) == 0.0:
-        low = change
-        high = change
     else:
         from scipy import stats
 

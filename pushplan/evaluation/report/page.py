@@ -51,17 +51,16 @@ def write_page(
     from markupsafe import Markup
 
     rows = [] if replays == "none" else chosen(run, most)
-    texts: list[str] = []
-    there: dict[str, int] = {}
+    texts: dict[str, str] = {}
     if replays == "embed":
-        found = {row.job: text for row in rows if (text := packed(run, row)) is not None}
-        texts = list(found.values())
-        there = dict.fromkeys(found, 1)
-    elif replays == "beside":
+        texts = {row.job: text for row in rows if (text := packed(run, row)) is not None}
+    there = dict.fromkeys(texts, 1)
+    if replays == "beside":
         there = dict.fromkeys(write_beside(run, rows, folder), 2)
     pairs = [table for table in tables if table.title.startswith("Paired")]
     configuration = run.about.get("configuration", {})
     facts = {"episodes": len(run.rows), **configuration}
+    sources = run.about.get("policies", {})
     told = {key: value for key, value in facts.items() if value not in (None, _USUAL.get(key))}
     drawn = []
     for caption, file in figures.items():
@@ -72,16 +71,16 @@ def write_page(
     text = page.from_string(_file("page.html")).render(
         version=pushplan.__version__,
         title=f"pushplan: {configuration.get('suite') or 'results'}",
-        facts=", ".join(f"{key} {value}" for key, value in told.items()),
+        facts=", ".join([*(f"{key} {value}" for key, value in told.items()), *run.remarks]),
         style=Markup(_file("page.css")),
         script=Markup(_file("page.js") + _file("replay.js") + "filter();\nchooseFirst();\n"),
         scores=[table for table in tables if table not in pairs],
         pairs=pairs,
         figures=drawn,
-        sources=[(k, v) for k, v in run.about.get("policies", {}).items() if k != v],
+        sources=[(k, v) for k in run.policies if (v := sources.get(k, k)) != k],
         runs=[in_words(one) for one in run.about.get("runs", ())],
         data=Markup(_escaped(json.dumps(page_data(run, there), separators=(",", ":")))),
-        replays=[Markup(_escaped(one)) for one in texts],
+        replays=[Markup(_escaped(one)) for one in texts.values()],
     )
     path = folder / PAGE
     write_atomic(path, text.encode())
@@ -105,12 +104,8 @@ def page_data(run: StoredRun, replays: Mapping[str, int]) -> dict[str, Any]:
     """
     policies = run.policies
     settings = list(run.titles)
-    scenarios: dict[str, int] = {}
-    listed: list[tuple[str, int, int]] = []
-    for row in run.rows:
-        if row.scenario not in scenarios:
-            scenarios[row.scenario] = len(listed)
-            listed.append((row.scenario, settings.index(row.setting), row.seed))
+    listed = {row.scenario: (settings.index(row.setting), row.seed) for row in run.rows}
+    scenarios = {scenario: i for i, scenario in enumerate(listed)}
     reasons = {reason: i for i, reason in enumerate(dict.fromkeys(r.reason for r in run.rows))}
     statuses = list(dict.fromkeys(row.status for row in run.rows))
     values = _values(run)
@@ -122,18 +117,16 @@ def page_data(run: StoredRun, replays: Mapping[str, int]) -> dict[str, Any]:
             outcomes.append(row.status)
         else:
             outcomes.append("success" if row.success else row.reason)
+    shown = {"outcome": outcomes, **values}
     return {
         "folder": str(run.path) if run.path is not None else "DIR",
         "policies": policies,
         "colours": _colours(),
         "settings": list(run.titles.values()),
-        "scenarios": listed,
+        "scenarios": [(scenario, *where) for scenario, where in listed.items()],
         "statuses": statuses,
         "reasons": list(reasons),
-        "measures": [
-            ("outcome", "outcome"),
-            *((name, headings.get(name, name)) for name in values),
-        ],
+        "measures": [(name, headings.get(name, name)) for name in shown],
         "rows": {
             "policy": [policies.index(row.policy) for row in run.rows],
             "scenario": [scenarios[row.scenario] for row in run.rows],
@@ -143,7 +136,7 @@ def page_data(run: StoredRun, replays: Mapping[str, int]) -> dict[str, Any]:
             "job": [row.job for row in run.rows],
             "trace": [row.trace for row in run.rows],
             "replay": [replays.get(row.job, 0) for row in run.rows],
-            "values": {"outcome": outcomes, **values},
+            "values": shown,
         },
     }
 

@@ -35,9 +35,10 @@ def _style(index: int, name: str, kinds: Sequence[Any]) -> dict[str, Any]:
 
 
 def interval(one: Estimate | Proportion) -> list[list[float]]:
-    """An interval as Matplotlib's error bars take it."""
+    """An interval as Matplotlib's error bars take it; NaN, which draws none, if there is none."""
     middle = one.mean if isinstance(one, Estimate) else one.fraction
-    return [[max(0.0, middle - one.low)], [max(0.0, one.high - middle)]]
+    # in this order NaN stays NaN
+    return [[max(middle - one.low, 0.0)], [max(one.high - middle, 0.0)]]
 
 
 def wrapped(text: str, letters: int = NAME_LETTERS) -> str:

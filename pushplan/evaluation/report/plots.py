@@ -87,8 +87,8 @@ def _tradeoff(run: StoredRun) -> Figure | None:
         if len(xy) == 0:
             return
         points = _cloud(axes, xy[:, 0], xy[:, 1], index, s=10, alpha=0.35)
-        across = estimate(xy[:, 0])
-        up = estimate(xy[:, 1])
+        across = estimate(values_of(rows, f"I_{kind}"))
+        up = estimate(values_of(rows, f"E_{kind}"))  # failed runs have no I
         bar = axes.errorbar(
             across.mean,
             up.mean,
@@ -100,7 +100,7 @@ def _tradeoff(run: StoredRun) -> Figure | None:
             elinewidth=1.0,
             capsize=2,
             linestyle="none",
-            label=label,
+            label=_with_failures(run.rows, label),
             zorder=5,
             **dots(index),
         )
@@ -114,6 +114,12 @@ def _tradeoff(run: StoredRun) -> Figure | None:
         figure.axes[0].set_xlim(right=1.02)
         figure.axes[0].set_ylim(top=max(1.03, figure.axes[0].get_ylim()[1]))
     return figure
+
+
+def _with_failures(rows: Sequence[ResultRow], policy: str) -> str:
+    """The label of a policy, and how many of its runs failed, since these have no score I."""
+    failed = sum(row.failed for row in rows if row.policy == policy)
+    return f"{policy} ({failed} failed)" if failed else policy
 
 
 def _cloud(axes: Any, x: Any, y: Any, index: int, **style: Any) -> Any:
@@ -203,7 +209,8 @@ def _profiles(run: StoredRun) -> Figure | None:
             if not strata:
                 continue
             found = performance_profile(strata, thresholds)
-            axes.step(thresholds, found.fractions, where="post", label=label, **line(i))
+            shown = _with_failures(run.rows, label)
+            axes.step(thresholds, found.fractions, where="post", label=shown, **line(i))
             band = {"step": "post", "color": line(i)["color"], "alpha": 0.18, "linewidth": 0}
             axes.fill_between(thresholds, found.low, found.high, **band)
         axes.set_xlabel(f"{heading(name)} above")
@@ -318,7 +325,7 @@ def _intervals(run: StoredRun) -> Figure:
         if len(run.titles) > 1:
             place(wrapped(title))
         for policy, index in run.policies_in(setting).items():
-            height = place(wrapped(policy))
+            height = place(wrapped(_with_failures(run.rows_of(setting), policy)))
             for axes, names in zip(panels, [[], *columns.values()], strict=True):
                 _bar(axes, found[setting, policy], names, height, index)
     figure.set_figheight(LINE * below + 0.5)

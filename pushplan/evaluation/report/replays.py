@@ -143,14 +143,9 @@ def _plans(episode: Episode) -> list[dict[str, Any]]:
         path = plans.path(index)
         (moved, poses) = plans.expected(index)
         kept = thinned(len(path), PATH)
-        found.append(
-            {
-                "time": round(float(plans.times[index] - episode.times[0]), 3),
-                "path": _flat(path[kept, :2]),
-                "moved": moved.tolist(),
-                "ends": _flat(poses),
-            }
-        )
+        time = round(float(plans.times[index] - episode.times[0]), 3)
+        way = _flat(path[kept, :2])
+        found.append({"time": time, "path": way, "moved": moved.tolist(), "ends": _flat(poses)})
     return found
 
 

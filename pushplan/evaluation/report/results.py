@@ -88,14 +88,15 @@ class Results(StoredRun):
         ]
 
     def table(self, width: int = 160, *, settings: bool = False, pairs: str = "first") -> str:
-        """Scores and paired differences as text of at most ``width`` characters a line.
+        """Scores, paired differences and `remarks` as text.
 
         Args:
-            width: of a line.
+            width: most characters of a line of a table.
             settings: as for `tables`.
             pairs: as for `compare`.
         """
-        return text(on_few_lines(self.tables(settings=settings, pairs=pairs)), width)
+        tables = on_few_lines(self.tables(settings=settings, pairs=pairs))
+        return "\n".join([text(tables, width), *self.remarks])
 
     def figure(self, name: str) -> Any:
         """One figure of the report, to show or to save.
@@ -196,7 +197,8 @@ class Results(StoredRun):
             remove_report(folder)
         write_atomic(folder / "results.csv", rows_csv(self.rows).encode())
         tables = self.tables(wide=True, settings=True, pairs=pairs)
-        write_atomic(folder / "summary.md", markdown(tables).encode())
+        lines = [markdown(tables), *self.remarks]
+        write_atomic(folder / "summary.md", "\n".join(lines).encode())
         write_atomic(folder / "summary.csv", summary_csv(self.summary(), self.titles).encode())
         if len(self.titles) > 1:
             compared = [*self.pooled.compare(pairs), *compared]

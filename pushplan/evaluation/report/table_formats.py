@@ -7,11 +7,12 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from pushplan.evaluation.report.latex_tables import latex as latex
-from pushplan.evaluation.report.tables import Table
+from pushplan.evaluation.report.tables import RUNS_NOTE, Table
 from pushplan.evaluation.statistics.summary import PairedDifference, PolicySummary
 from pushplan.evaluation.store.rows import csv_text
 
 if TYPE_CHECKING:
+    from rich.console import Console
     from rich.table import Table as RichTable
 
 
@@ -54,9 +55,20 @@ def differences_csv(pairs: Sequence[PairedDifference], titles: dict[str, str]) -
 
 
 def _csv(names: str, lines: Sequence[Mapping[str, object]]) -> str:
-    """The values of these names, with commas between them; an empty field where there is none."""
+    """The values of these names, with commas between them; an empty field for None and NaN."""
     header = names.split(",")
-    return csv_text(header, [[line.get(name) for name in header] for line in lines])
+    found = [[line.get(name) for name in header] for line in lines]
+    # NaN alone is not equal to itself
+    return csv_text(header, [[one if one == one else None for one in line] for line in found])
+
+
+def print_tables(tables: Sequence[Table], console: Console) -> None:
+    """Print tables on a terminal, and below them `RUNS_NOTE` if it belongs to one."""
+    for table in tables:
+        console.print(rich_table(table))
+        console.print()
+    if any(RUNS_NOTE in table.note for table in tables):
+        console.print(RUNS_NOTE, markup=False, highlight=False)
 
 
 def rich_table(table: Table) -> RichTable:
@@ -91,9 +103,7 @@ def text(tables: Sequence[Table], width: int = 160) -> str:
         color_system=None,
     )
     with console.capture() as capture:
-        for table in tables:
-            console.print(rich_table(table))
-            console.print()
+        print_tables(tables, console)
     return "\n".join(line.rstrip() for line in capture.get().rstrip().splitlines()) + "\n"
 
 

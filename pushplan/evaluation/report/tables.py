@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -12,13 +15,14 @@ from pushplan.evaluation.statistics.aggregates import (
     interquartile_mean,
     probability_of_improvement,
 )
-from pushplan.evaluation.statistics.estimates import Estimate, Proportion, estimate
+from pushplan.evaluation.statistics.estimates import Estimate, Proportion
 from pushplan.evaluation.statistics.gaps import Gap
 from pushplan.evaluation.statistics.summary import (
     PairedDifference,
     PolicySummary,
     grouped,
     settings_of,
+    summarise,
     values_of,
 )
 from pushplan.evaluation.store.rows import ResultRow
@@ -58,27 +62,34 @@ class Table:
 
 SCORE_NOTE = (
     "mean ± standard deviation over episodes, 95 % bootstrap interval of the mean below; success "
-    "with its Wilson interval; a failed job counts as no success and E_nav = 0; path and work "
-    "include episodes that ended early, without success; plan is the median over episodes of each "
-    "episode's median planning call, its slowest call below; step is the same for the time from "
-    "world to action, without simulation"
+    "with its Wilson interval; path and work include episodes that ended early, without success; "
+    "plan is the median over episodes of each episode's median planning call, its slowest call "
+    "below; step is the same for the time from world to action, without simulation"
 )
+RUNS_NOTE = (
+    "n: runs behind a value, if not all; runs '3 of 5': the policy does not fit 2 starts of the "
+    "table, was not asked for there, or has to run there yet; a failed run has no success and "
+    "E_nav, E_manip, S_manip = 0, but no I_nav, I_manip, path, work, wall time and further "
+    "metrics: these are of the other runs and may look better for it; runs of one world file that "
+    "all drive alike are one"
+)
+_FEWER = re.compile(r"\nn = |^\d+ (of \d+|failed)$", re.MULTILINE)
 MEASURED_NOTE = (
-    "mean ± standard deviation over the episodes that did not fail, 95 % bootstrap interval of "
-    "the mean below; med is the median"
+    "mean ± standard deviation over episodes, 95 % bootstrap interval of the mean below; med is "
+    "the median"
 )
 PAIR_NOTE = (
-    "second policy minus first on the same scenarios, path and work only where both succeed: "
-    "mean, 95 % bootstrap interval; better and worse count the scenarios in which the second "
-    "policy has the better or worse value, by the metric's own direction; p is of the signed-rank"
-    " test (sign test for success), corrected by Holm over the pairs and settings of a metric; "
-    "effect is the rank-biserial correlation, 1 where the second is better every time; * where p "
-    "< 0.05 with 10 scenarios at least; more is the number of further scenarios for a power of "
-    "0.8 if the observed differences hold"
+    "second policy minus first on the same scenarios, I_nav and I_manip only where neither failed, "
+    "path and work only where both succeed: mean, 95 % bootstrap interval; better and worse count "
+    "the scenarios in which the second policy has the better or worse value, by the metric's own "
+    "direction; p is of the signed-rank test (sign test for success), corrected by Holm over the "
+    "pairs and settings of a metric; effect is the rank-biserial correlation, 1 where the second "
+    "is better every time; * where p < 0.05 with 10 scenarios at least; more is the number of "
+    "further scenarios for a power of 0.8 if the observed differences hold"
 )
 BRIEF_NOTE = (
-    "second policy minus first on the same scenarios: mean, 95 % bootstrap interval; * where p < "
-    "0.05, corrected by Holm, with 10 scenarios at least; 'differences.csv' has the rest"
+    "second policy minus first on the same {} scenarios: mean, 95 % bootstrap interval; * where p "
+    "< 0.05, corrected by Holm, with 10 scenarios at least; 'differences.csv' has the rest"
 )
 _APART_NOTE = (
     "mean and test point in different directions in {}: few large differences outweigh many small "
@@ -123,14 +134,31 @@ def score_tables(
         headings = ("policy", "runs", "success", *(heading(name) for name in metrics))
         cells = []
         for summary in mine:
-            failed = f"\n{summary.failed} failed" if summary.failed else ""
+            runs = f"{summary.episodes}"
+            if summary.missing:
+                runs += f" of {summary.episodes + summary.missing}"
+            if summary.failed:
+                runs += f"\n{summary.failed} failed"
             rate = summary.success
-            success = f"{rate.fraction:.2f}\n{_interval(rate, 2)}"
+            success = f"{rate.fraction:.2f}{_interval(rate, 2)}"
+            success += of_runs(rate.count, summary.episodes)
             values = (_score(summary, name, wide=wide) for name in metrics)
-            cells.append((summary.policy, f"{summary.episodes}{failed}", success, *values))
+            cells.append((summary.policy, runs, success, *values))
         note = SCORE_NOTE + ("; med is the median" if wide else "")
-        tables.append(Table(titles.get(setting, setting), headings, tuple(cells), note))
+        tables.append(_noted(Table(titles.get(setting, setting), headings, tuple(cells), note)))
     return tables
+
+
+def of_runs(count: int, runs: int) -> str:
+    """A line of a cell with the number of runs behind it, where it is not the usual one."""
+    return "" if count == runs else f"\nn = {count}"
+
+
+def _noted(table: Table) -> Table:
+    """The table, with `RUNS_NOTE` if runs failed or a cell says how many it is from."""
+    if any(_FEWER.search(cell) for row in table.cells for cell in row):
+        table = replace(table, note=f"{table.note}; {RUNS_NOTE}")
+    return table
 
 
 def _score(summary: PolicySummary, name: str, *, wide: bool) -> str:
@@ -139,31 +167,25 @@ def _score(summary: PolicySummary, name: str, *, wide: bool) -> str:
     if value is None:
         return ""
     if name not in _TIMES:
-        return _estimate(value, _digits(name), wide=wide)
+        return _estimate(value, _digits(name), summary.episodes, wide=wide)
     text = milliseconds(value.median)
     longest = summary.metrics.get(_TIMES[name])
     if longest is not None:
         text += f"\nmax {milliseconds(longest.highest)}"
-    return text
+    return text + of_runs(value.count, summary.episodes)
 
 
 def gap_tables(found: Sequence[Gap], titles: Mapping[str, str]) -> list[Table]:
     """One table a setting of how far its policies are from what is known to be possible."""
     tables = []
     for setting in dict.fromkeys(gap.setting for gap in found):
-        cells = tuple(
-            (
-                gap.policy,
-                f"{gap.to_best:+.1%}" if gap.with_best else "",
-                str(gap.with_best),
-                f"{gap.to_bound:+.1%}",
-                str(gap.count),
-            )
-            for gap in found
-            if gap.setting == setting
-        )
+        cells = []
+        for gap in (one for one in found if one.setting == setting):
+            best = f"{gap.to_best:+.1%}" if gap.with_best else ""
+            bound = f"{gap.to_bound:+.1%}"
+            cells.append((gap.policy, best, f"{gap.with_best}", bound, f"{gap.count}"))
         headings = ("policy", "above best known", "of", "above bound", "of")
-        tables.append(Table(titles.get(setting, setting), headings, cells, GAP_NOTE))
+        tables.append(Table(titles.get(setting, setting), headings, tuple(cells), GAP_NOTE))
     return tables
 
 
@@ -183,19 +205,13 @@ def measured_tables(
         policies: rows, in order.
         titles: text for each setting, in order.
     """
-    groups = grouped(rows)
+    scored = [replace(row, metrics={**row.metrics, **measured.get(row.job, {})}) for row in rows]
+    found = summarise(scored, policies, metrics)
     tables = []
     for setting, title in titles.items():
-        cells = []
-        for policy in policies:
-            found = [measured.get(row.job, {}) for row in groups.get((setting, policy), [])]
-            line = []
-            for name in metrics:
-                values = [one[name] for one in found if name in one]
-                line.append(_estimate(estimate(values), _digits(name)) if values else "")
-            if any(line):
-                cells.append((policy, *line))
-        tables.append(Table(title, ("policy", *metrics), tuple(cells), MEASURED_NOTE))
+        mine = [one for one in found if one.setting == setting and one.metrics]
+        cells = [(one.policy, *(_score(one, name, wide=True) for name in metrics)) for one in mine]
+        tables.append(_noted(Table(title, ("policy", *metrics), tuple(cells), MEASURED_NOTE)))
     return tables if any(table.cells for table in tables) else []
 
 
@@ -209,42 +225,36 @@ def difference_tables(
     for setting in dict.fromkeys(pair.setting for pair in pairs):
         mine = [pair for pair in pairs if pair.setting == setting]
         metrics = list(dict.fromkeys(pair.metric for pair in mine))
+        most = max(pair.difference.count for pair in mine)
         cells: list[tuple[str, ...]] = []
         brief: dict[str, list[str]] = {}
         for pair in mine:
             names = f"{pair.second} - {pair.first}"
             digits = _digits(pair.metric)
             mean = f"{pair.difference.mean:+.{digits}f}"
-            interval = _interval(pair.difference, digits, "+")
+            interval = _interval(pair.difference, digits, "+").lstrip()
             star = " *" if pair.significant else ""
+            count = pair.difference.count
             line = brief.setdefault(names, [""] * len(metrics))
-            line[metrics.index(pair.metric)] = f"{mean} {interval}{star}"
+            shown = f"{mean} {interval}".rstrip() + star
+            line[metrics.index(pair.metric)] = shown + of_runs(count, most)
             p_value = f"{pair.p_corrected:.3f}"
             if pair.p_corrected < 0.001:
                 p_value = "< 0.001"
-            cells.append(
-                (
-                    heading(pair.metric),
-                    names,
-                    mean + star,
-                    interval,
-                    f"{pair.better} / {pair.worse} / {pair.difference.count}",
-                    p_value,
-                    f"{pair.effect:+.2f}",
-                    _more(pair),
-                )
-            )
+            wins = f"{pair.better} / {pair.worse} / {count}"
+            tested = wins, p_value, f"{pair.effect:+.2f}", _more(pair)
+            cells.append((heading(pair.metric), names, mean + star, interval, *tested))
         headings = _PAIR_HEADINGS
         note = PAIR_NOTE
         if not wide and len(cells) > MANY_PAIRS:
             cells = [(names, *line) for names, line in brief.items()]
             headings = ("pair", *map(heading, metrics))
-            note = BRIEF_NOTE
+            note = BRIEF_NOTE.format(most)
         if apart := [pair for pair in mine if pair.significant and _is_mean_apart(pair)]:
             named = (f"{heading(p.metric)} of {p.second} - {p.first}" for p in apart)
             note = f"{note}; {_APART_NOTE.format(', '.join(named))}"
         title = f"Paired differences: {titles.get(setting, setting)}"
-        tables.append(Table(title, headings, tuple(cells), note))
+        tables.append(_noted(Table(title, headings, tuple(cells), note)))
     return tables
 
 
@@ -290,51 +300,56 @@ def aggregate_table(rows: Sequence[ResultRow], policies: Sequence[str]) -> Table
     if len(settings) < 2:
         return None
     strata: dict[tuple[str, str], list[FloatArray]] = {}
-    for label in policies:
-        for name in metric_names(Role.SCORE):
-            values = [values_of(groups.get((setting, label), []), name) for setting in settings]
-            if all(values):
-                strata[label, name] = [np.array(found) for found in values]
-    shown = [n for n in metric_names(Role.SCORE) if any(name == n for _, name in strata)]
+    for name, label in itertools.product(metric_names(Role.SCORE), policies):
+        values = [values_of(groups.get((setting, label), []), name) for setting in settings]
+        if all(values):
+            strata[label, name] = [np.array(found) for found in values]
+    shown = list(dict.fromkeys(name for _, name in strata))
     if not shown:
         return None
     first = policies[0]
     headings = ["policy"]
     for name in shown:
         headings += [heading(name), f"P({name})"]
+    starts = len({(row.scenario, row.seed) for row in rows})
+
+    def cell(found: Aggregate, digits: int, *samples: list[FloatArray]) -> str:
+        count = min(sum(map(len, sample)) for sample in samples)
+        return f"{found.value:.{digits}f}{_interval(found, digits)}{of_runs(count, starts)}"
+
     cells = []
     for label in policies:
         line = [label]
         for name in shown:
             mine = strata.get((label, name))
             base = strata.get((first, name))
-            middle = ""
-            better = ""
-            if mine:
-                found = interquartile_mean(mine)
-                middle = f"{found.value:.3f}\n{_interval(found, 3)}"
+            line += [cell(interquartile_mean(mine), 3, mine) if mine else "", ""]
             if mine and base and label != first:
-                found = probability_of_improvement(mine, base)
-                better = f"{found.value:.2f}\n{_interval(found, 2)}"
-            line += [middle, better]
+                line[-1] = cell(probability_of_improvement(mine, base), 2, mine, base)
         if any(line[1:]):
             cells.append(tuple(line))
     title = f"Interquartile means of all {len(settings)} settings"
-    return Table(title, tuple(headings), tuple(cells), AGGREGATE_NOTE.format(first=first))
+    note = AGGREGATE_NOTE.format(first=first)
+    return _noted(Table(title, tuple(headings), tuple(cells), note))
 
 
 def _digits(column: str) -> int:
     return METRICS[column].digits if column in METRICS else 3
 
 
-def _estimate(value: Estimate, digits: int, *, wide: bool = True) -> str:
-    middle = f"\nmed {value.median:.{digits}f}" if wide else ""
-    spread = f"{value.mean:.{digits}f} ± {value.sd:.{digits}f}"
-    return f"{spread}\n{_interval(value, digits)}{middle}"
+def _estimate(value: Estimate, digits: int, runs: int, *, wide: bool = True) -> str:
+    text = f"{value.mean:.{digits}f}"
+    if value.count > 1:
+        text += f" ± {value.sd:.{digits}f}{_interval(value, digits)}"
+        text += f"\nmed {value.median:.{digits}f}" if wide else ""
+    return text + of_runs(value.count, runs)
 
 
 def _interval(value: Estimate | Aggregate | Proportion, digits: int, sign: str = "") -> str:
-    return f"[{value.low:{sign}.{digits}f}, {value.high:{sign}.{digits}f}]"
+    """A line with the interval; empty if there is none."""
+    if math.isnan(value.low):
+        return ""
+    return f"\n[{value.low:{sign}.{digits}f}, {value.high:{sign}.{digits}f}]"
 
 
 def milliseconds(seconds: float) -> str:

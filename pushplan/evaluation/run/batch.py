@@ -72,9 +72,9 @@ def run_batch(
     call and ends with the same results.
 
     A job is known by a hash of all that its result depends on (`job_identity.job_spec`): the
-    policy's code and parameters, the scenario, the settings, and versions. A row shows the result
-    that was asked for last of its policy label, scenario and seed; other ones stay stored, and
-    count at once when they are asked for again.
+    policy's code and parameters, the scenario, the settings, and versions. Only the jobs of the
+    last call have rows; results of others stay stored, and count at once when they are asked for
+    again.
 
     Args:
         jobs: what to run; policy label, scenario key and seed tell them apart.
@@ -93,7 +93,7 @@ def run_batch(
         progress: told of every row.
 
     Returns:
-        All rows of the run directory, sorted.
+        The rows of these jobs, sorted.
 
     Raises:
         InvalidInputError: if another process writes into the directory, two jobs are the same, or
@@ -117,7 +117,7 @@ def run_batch(
     with RunDirectory(out) as store:
         note_batch(store, jobs, settings, about)
         if retry_failed:
-            store.forget_failures()
+            store.forget_failures(job.key for job in jobs)
         pending = pending_jobs(jobs, store, any_version)
         if pending:
             begun = {**provenance(workers), "jobs": len(jobs), "done": len(jobs) - len(pending)}

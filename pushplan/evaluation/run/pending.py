@@ -48,30 +48,18 @@ def note_batch(
             deadlines[label] = stop.seconds
         named = "/" in job.key[1]  # scenarios of a suite have different variations
         titles[setting] = (setting if named else job.title) + mode
-    store.extend("policies", policies)
+    store.note("jobs", len(jobs))
+    # the order of this call comes first: tables compare with the first policy
+    store.note("policies", {**policies, **store.about().get("policies", {}), **policies})
     store.extend("deadlines", deadlines)
     store.extend("settings", titles)
 
 
 def pending_jobs(jobs: Sequence[Job], store: RunDirectory, any_version: bool) -> list[Job]:
-    """The `identified` jobs without a result; results of the others count from now on."""
+    """The `identified` jobs without a result; from now on only results of these jobs count."""
     stored = store.results()
-    jobs = _with_data(jobs, stored)
-    _hide_outdated(jobs, stored, store, any_version)
-    done = {one.row.job: one.row.job for one in stored}
-    if any_version:
-        done |= {same_but_versions(one.spec): one.row.job for one in stored if one.spec}
-    shown = []
-    pending = []
-    for job in jobs:
-        names = [job.id]
-        if any_version and job.spec:
-            names.append(same_but_versions(job.spec))
-        if (there := next((done[name] for name in names if name in done), None)) is None:
-            pending.append(job)
-        else:
-            shown.append(there)
-    store.show(shown)
+    shown, pending = sorted_out(jobs, stored, any_version)
+    store.show_only(shown)
     before = {
         (one.row.policy, one.row.scenario, one.row.seed): one.spec
         for one in sorted(stored, key=lambda one: one.current)
@@ -88,6 +76,27 @@ def pending_jobs(jobs: Sequence[Job], store: RunDirectory, any_version: bool) ->
             DATABASE,
         )
     return pending
+
+
+def sorted_out(
+    jobs: Sequence[Job], stored: Sequence[StoredResult], any_version: bool
+) -> tuple[list[str], list[Job]]:
+    """The results of `identified` jobs, by the jobs that they are stored for; jobs without one."""
+    jobs = _with_data(jobs, stored)
+    done = {one.row.job: one.row.job for one in stored}
+    if any_version:
+        done |= {same_but_versions(one.spec): one.row.job for one in stored if one.spec}
+    shown = []
+    pending = []
+    for job in jobs:
+        names = [job.id]
+        if any_version and job.spec:
+            names.append(same_but_versions(job.spec))
+        if (there := next((done[name] for name in names if name in done), None)) is None:
+            pending.append(job)
+        else:
+            shown.append(there)
+    return shown, pending
 
 
 def _with_data(jobs: Sequence[Job], stored: Sequence[StoredResult]) -> list[Job]:
@@ -128,38 +137,6 @@ def _users_code(job: Job, spec: Mapping[str, Any]) -> str:
         return str(job.policy.source)
     files = spec.get("files", {}).items()
     return json.dumps({name: one for name, one in files if not name.endswith("_file")})
-
-
-def _hide_outdated(
-    jobs: Sequence[Job], stored: Sequence[StoredResult], store: RunDirectory, any_version: bool
-) -> None:
-    """Let results of a policy that is another one now, or was run otherwise, count no more.
-
-    They would be averaged with those of now: a label is one policy, and a setting is run one way.
-    """
-    names = ("settings", "data") if any_version else ("settings", "data", "versions")
-    first = {job.policy.label: job for job in jobs}
-    ways: dict[tuple[str, str], list[Any]] = {}
-    for job in jobs:
-        assert job.spec is not None
-        setting = job.policy.label, setting_of(*job.key[1:])
-        ways[setting] = [job.spec.get(name) for name in names]
-    outdated = []
-    for one in stored:
-        if not one.spec:  # saved from a CSV file, which does not say how it came about
-            continue
-        row = one.row
-        asked = first.get(row.policy)
-        way = [one.spec.get(name) for name in names]
-        changed = asked and _policy(asked, one.spec) != _policy(asked, asked.spec or {})
-        if changed or ways.get((row.policy, setting_of(row.scenario, row.seed)), way) != way:
-            outdated.append(row.job)
-    store.hide(outdated)
-
-
-def _policy(job: Job, spec: Mapping[str, Any]) -> tuple[object, object]:
-    """The code of a job's policy and, if that is a user's, what it has read, by a specification."""
-    return _identity(spec), spec.get("data") if job.policy.group else None
 
 
 def _identity(spec: Mapping[str, Any] | None) -> object:

@@ -23,7 +23,7 @@ Strata = Sequence[FloatArray]
 
 @dataclass(frozen=True)
 class Aggregate:
-    """A statistic over all settings with its 95 % interval."""
+    """A statistic over all settings with its 95 % interval, NaN if no setting has two values."""
 
     value: float
     low: float
@@ -36,7 +36,7 @@ class Profile:
 
     thresholds: FloatArray  # (T,)
     fractions: FloatArray  # (T,)
-    low: FloatArray  # (T,)
+    low: FloatArray  # (T,), NaN if no setting has two values
     high: FloatArray  # (T,)
 
 
@@ -128,4 +128,6 @@ def _bootstrap(
         found.append(statistic(drawn))
     value = statistic([[x[None] for x in strata] for strata in checked])[0]
     low, high = np.percentile(np.concatenate(found), (2.5, 97.5), axis=0)
+    if all(len(x) == 1 for strata in checked for x in strata):
+        low, high = np.full_like((low, high), np.nan)
     return value, low, high

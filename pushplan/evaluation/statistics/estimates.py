@@ -34,10 +34,10 @@ class Estimate:
     Attributes:
         count: sample size.
         mean: arithmetic mean.
-        sd: standard deviation with n - 1 in the denominator; 0 for one value.
+        sd: standard deviation with n - 1 in the denominator; NaN for one value.
         median: 50th percentile.
-        low: lower end of the 95 % interval of the mean.
-        high: its upper end.
+        low: lower end of the 95 % interval of the mean; NaN for one value.
+        high: its upper end; NaN for one value.
         highest: greatest value.
     """
 
@@ -73,7 +73,7 @@ def estimate(values: Sequence[float] | FloatArray) -> Estimate:
     return Estimate(
         count=len(sample),
         mean=float(sample.mean()),
-        sd=float(sample.std(ddof=1)) if len(sample) > 1 else 0.0,
+        sd=float(sample.std(ddof=1)) if len(sample) > 1 else math.nan,
         median=float(np.median(sample)),
         low=low,
         high=high,
@@ -86,8 +86,8 @@ def bootstrap_interval(
 ) -> tuple[float, float]:
     """Bias-corrected and accelerated bootstrap interval of the mean.
 
-    Efron, Better Bootstrap Confidence Intervals, JASA 82 (1987). A sample without spread has an
-    interval without width.
+    Efron, Better Bootstrap Confidence Intervals, JASA 82 (1987). Several values without spread have
+    an interval without width. One value says nothing about the spread: both ends are NaN.
 
     Args:
         values: the sample, finite and not empty.
@@ -96,6 +96,8 @@ def bootstrap_interval(
     """
     sample = np.asarray(values, dtype=np.float64)
     mean = float(sample.mean())
+    if len(sample) == 1:
+        return math.nan, math.nan
     if np.ptp(sample) <= 1e-12 * max(1.0, abs(mean)):
         return mean, mean
     from scipy import stats  # takes a second to import, and only tables need it
@@ -126,9 +128,8 @@ def wilson(successes: int, count: int, *, z: float = 1.959963984540054) -> Propo
     fraction = successes / count
     scale = 1.0 + z * z / count
     centre = (fraction + z * z / (2.0 * count)) / scale
-    half = (
-        z / scale * math.sqrt(fraction * (1.0 - fraction) / count + z * z / (4.0 * count * count))
-    )
+    variance = fraction * (1.0 - fraction) / count + z * z / (4.0 * count * count)
+    half = z / scale * math.sqrt(variance)
     low = 0.0 if successes == 0 else centre - half
     high = 1.0 if successes == count else centre + half
     return Proportion(count, fraction, low, high)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pushplan.evaluation.statistics.summary import grouped, policies_of, settings_of
+from pushplan.evaluation.statistics.summary import grouped
 from pushplan.evaluation.store.rows import ResultRow
 from pushplan.scenarios.known_bounds import KnownBounds
 
@@ -48,20 +48,18 @@ def gaps(
 ) -> list[Gap]:
     """The gaps of each policy in each setting; none where no bound is known."""
     found = []
-    groups = grouped(rows)
-    for setting in sorted(settings_of(rows)):
-        for policy in policies_of(rows, policies):
-            to_bound = []
-            to_best = []
-            for row in groups.get((setting, policy), []):
-                mine = bounds.get(row.scenario)
-                if mine is None or (work := total_work(row, mine)) is None or mine.bound <= 0.0:
-                    continue
-                to_bound.append(work / mine.bound - 1.0)
-                if mine.best is not None:
-                    to_best.append(work / mine.best - 1.0)
-            if to_bound:
-                mean = float(np.mean(to_best)) if to_best else float("nan")
-                to = float(np.mean(to_bound))
-                found.append(Gap(setting, policy, len(to_bound), to, len(to_best), mean))
-    return found
+    for (setting, policy), group in grouped(rows, policies).items():
+        to_bound = []
+        to_best = []
+        for row in group:
+            mine = bounds.get(row.scenario)
+            if mine is None or (work := total_work(row, mine)) is None or mine.bound <= 0.0:
+                continue
+            to_bound.append(work / mine.bound - 1.0)
+            if mine.best is not None:
+                to_best.append(work / mine.best - 1.0)
+        if to_bound:
+            mean = float(np.mean(to_best)) if to_best else float("nan")
+            to = float(np.mean(to_bound))
+            found.append(Gap(setting, policy, len(to_bound), to, len(to_best), mean))
+    return sorted(found, key=lambda gap: gap.setting)

@@ -40,7 +40,7 @@ class StoredRun:
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """Read a run directory.
+        """Read what the last command on a run directory asked for; all of one that was merged.
 
         Raises:
             InvalidInputError: if it holds no results.
@@ -58,6 +58,19 @@ class StoredRun:
         """Words for each setting."""
         known = self.about.get("settings", {})
         return {setting: known.get(setting, setting) for setting in settings_of(self.rows)}
+
+    @property
+    def remarks(self) -> list[str]:
+        """Lines about results that are not among the rows: those to come, and other ones."""
+        lines = []
+        jobs = self.about.get("jobs")
+        if isinstance(jobs, int) and jobs > len(self.rows):
+            lines.append(f"{jobs - len(self.rows)} of {jobs} jobs have no result yet")
+        if others := self.about.get("left_out"):
+            listed = ", ".join(f"{count} of {policy}" for policy, count in others.items())
+            what = f"results that the last command did not ask for: {listed}"
+            lines.append(f"{self.path} also holds {what}; a command that asks for them shows them")
+        return lines
 
     @functools.cached_property
     def pooled(self) -> Self:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,9 +35,11 @@ TIMINGS = (
     "decision_time_max_s",
     "wall_time_s",
 )
-
+SUMMARISED = (*metric_names(Role.SCORE, Role.DETAIL, Role.FACT), *TIMINGS)
 _WORLDS = "room"
 """Task of the worlds of files."""
+_SUMS = ("wall_time_s", "plan_calls", *(name for name, one in METRICS.items() if one.until_failure))
+"""Columns that are smaller for a run that failed early."""
 
 
 @dataclass(frozen=True)
@@ -48,14 +51,16 @@ class PolicySummary:
         policy: label.
         episodes: number of rows.
         failed: rows that did not end by the rules of the task.
+        missing: starts that other policies ran in the setting and this one did not.
         success: fraction of successes; failed rows count as none.
-        metrics: estimate of each column that has values.
+        metrics: estimate of each column that has values, see `values_of`.
     """
 
     setting: str
     policy: str
     episodes: int
     failed: int
+    missing: int
     success: Proportion
     metrics: dict[str, Estimate]
 
@@ -106,28 +111,29 @@ class PairedDifference:
         return "better" if self.effect > 0.0 else "worse"
 
 
-def summarise(rows: Sequence[ResultRow], order: Sequence[str] = ()) -> list[PolicySummary]:
+def summarise(
+    rows: Sequence[ResultRow], order: Sequence[str] = (), metrics: Sequence[str] = SUMMARISED
+) -> list[PolicySummary]:
     """One summary for each setting and policy.
 
     Args:
         rows: of a run.
         order: labels in the order in which policies are shown; others follow by name.
+        metrics: columns, or other names among the rows' metrics.
     """
-    groups = grouped(rows)
-    shown = (*metric_names(Role.SCORE, Role.DETAIL, Role.FACT), *TIMINGS)
+    starts = Counter(key[0] for key in {(row.setting, row.scenario, row.seed) for row in rows})
     found = []
-    for setting, policy in itertools.product(settings_of(rows), policies_of(rows, order)):
-        if (setting, policy) not in groups:
-            continue
-        mine = groups[setting, policy]
-        columns = {name: values_of(mine, name) for name in shown}
+    for (setting, policy), mine in grouped(rows, order).items():
+        columns = {name: values_of(mine, name) for name in metrics}
+        successes = values_of(mine, "success")
         found.append(
             PolicySummary(
                 setting=setting,
                 policy=policy,
                 episodes=len(mine),
                 failed=sum(row.failed for row in mine),
-                success=wilson(sum(row.success for row in mine), len(mine)),
+                missing=max(0, starts[setting] - len(mine)),
+                success=wilson(round(sum(successes)), len(successes)),
                 metrics={name: estimate(values) for name, values in columns.items() if values},
             )
         )
@@ -196,12 +202,15 @@ def paired_differences(
     return sorted(found, key=lambda pair: settings.index(pair.setting))
 
 
-def grouped(rows: Sequence[ResultRow]) -> dict[tuple[str, str], list[ResultRow]]:
-    """The rows by setting and policy."""
+def grouped(
+    rows: Sequence[ResultRow], order: Sequence[str] = ()
+) -> dict[tuple[str, str], list[ResultRow]]:
+    """The rows by setting and policy, in the order of `settings_of` and `policies_of`."""
     groups: dict[tuple[str, str], list[ResultRow]] = {}
     for row in rows:
         groups.setdefault((row.setting, row.policy), []).append(row)
-    return groups
+    keys = itertools.product(settings_of(rows), policies_of(rows, order))
+    return {key: groups[key] for key in keys if key in groups}
 
 
 def policies_of(rows: Sequence[ResultRow], order: Sequence[str] = ()) -> list[str]:
@@ -211,8 +220,22 @@ def policies_of(rows: Sequence[ResultRow], order: Sequence[str] = ()) -> list[st
 
 
 def values_of(rows: Sequence[ResultRow], metric: str) -> list[float]:
-    """The values of a column, without empty fields."""
-    return [float(v) for row in rows if (v := getattr(row, metric)) is not None]
+    """The values of a column in the rows of a policy.
+
+    Empty fields are left out, and a failed run's sums up to its failure, such as its time. Runs of
+    one world file that all drive alike are one run, except for what times they took.
+    """
+    found = [value for _, value in _valued(rows, metric)]
+    if metric in TIMINGS or not rows or rows[0].task != _WORLDS:
+        return found
+    return found if len(set(map(_drive, rows))) > 1 else found[:1]
+
+
+def _valued(rows: Sequence[ResultRow], metric: str) -> Iterator[tuple[ResultRow, float]]:
+    for row in rows:
+        value = row.metrics.get(metric, getattr(row, metric, None))
+        if value is not None and not (row.failed and metric in _SUMS):
+            yield row, float(value)
 
 
 def _drive(row: ResultRow) -> object:
@@ -220,18 +243,14 @@ def _drive(row: ResultRow) -> object:
 
     Elsewhere the seed decides the layout, and two drives through it may be alike by chance.
     """
-    if row.failed or row.task != _WORLDS or not row.metrics.get("path_length_m"):
+    if row.failed or row.task != _WORLDS or row.metrics.get("path_length_m") is None:
         return (row.scenario, row.seed)
     return (row.scenario.removesuffix(f"-{row.seed}"), row.reason, *sorted(row.metrics.items()))
 
 
 def by_scenario(rows: Sequence[ResultRow], metric: str) -> dict[tuple[str, int], float]:
-    """Scenario and seed -> value of a column, without empty fields."""
-    return {
-        (row.scenario, row.seed): float(value)
-        for row in rows
-        if (value := getattr(row, metric)) is not None
-    }
+    """Scenario and seed -> value of a column, without empty fields and sums up to a failure."""
+    return {(row.scenario, row.seed): value for row, value in _valued(rows, metric)}
 
 
 def settings_of(rows: Sequence[ResultRow]) -> list[str]:

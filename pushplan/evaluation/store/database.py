@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pushplan.errors import describe, short
+from pushplan.errors import describe, one_line, short
 from pushplan.evaluation.store.provenance import in_words
 from pushplan.evaluation.store.rows import ResultRow, checked_row, column_type, columns
 from pushplan.files.file_locks import is_locked
@@ -267,6 +267,14 @@ def read_rows(db: sqlite3.Connection) -> list[ResultRow]:
     order = "policy, task, simulator, seed, scenario"
     found = db.execute(f"SELECT * FROM results WHERE current ORDER BY {order}")
     return [_row_of(dict(values)) for values in found]
+
+
+def read_left_out(db: sqlite3.Connection) -> dict[str, int]:
+    """Policy -> scenarios and seeds of which it has results, none of which counts."""
+    key = "policy, scenario, seed"
+    others = f"SELECT {key} FROM results EXCEPT SELECT {key} FROM results WHERE current"
+    found = db.execute(f"SELECT policy, count(*) FROM ({others}) GROUP BY policy")
+    return {one_line(str(policy)): count for policy, count in found}
 
 
 def read_measured(db: sqlite3.Connection) -> dict[str, dict[str, float]]:

@@ -65,6 +65,8 @@ def merge(out: str | Path, sources: Sequence[str | Path]) -> Merged:
                         known += 1
                         if _timeless(one.row) != _timeless(there[one.row.job]):
                             differing.append(one.row.job)
+                        if one.current:
+                            store.show(one.row.job)
                         continue
                     trace, detail = files_of(folder, one.row)
                     if one.row.trace and trace is None:  # its episode is not what its name says
@@ -88,6 +90,7 @@ def _note(db: sqlite3.Connection, store: RunDirectory) -> None:
     runs = [*mine.get("runs", []), *about.get("runs", [])]
     distinct = [run for index, run in enumerate(runs) if run not in runs[:index]]
     store.note("runs", sorted(distinct, key=lambda run: str(run["began"])))
+    store.note("jobs", None)  # nobody has asked for all of them
 
 
 def _timeless(row: ResultRow) -> list[object]:

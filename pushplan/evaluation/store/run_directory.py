@@ -25,6 +25,7 @@ from pushplan.evaluation.store.database import (
     insert,
     new_database,
     read_about,
+    read_left_out,
     read_measured,
     read_results,
     read_rows,
@@ -134,15 +135,16 @@ class RunDirectory:
         """Add entries to a JSON mapping about the run."""
         self.note(key, {**self.about().get(key, {}), **entries})
 
-    def show(self, jobs: Iterable[str]) -> None:
-        """Let these results be the ones that count for their policies and scenarios."""
+    def show(self, job: str) -> None:
+        """Let this result be the one that counts for its policy and scenario."""
         with self._use() as db:
-            db.executemany(_HIDE_OTHERS, ((job, job) for job in jobs))
+            db.execute(_HIDE_OTHERS, (job, job))
 
-    def hide(self, jobs: Iterable[str]) -> None:
-        """Let these results count no more, until they are shown again."""
+    def show_only(self, jobs: Iterable[str]) -> None:
+        """Let these results count and no others, until those are asked for again."""
         with self._use() as db:
-            db.executemany("UPDATE results SET current = 0 WHERE job = ?", ((j,) for j in jobs))
+            db.execute("UPDATE results SET current = 0 WHERE current")
+            db.executemany("UPDATE results SET current = 1 WHERE job = ?", ((j,) for j in jobs))
 
     def begin(self, job: str, title: str) -> None:
         """Note that a job is being run."""
@@ -183,10 +185,11 @@ class RunDirectory:
             db.execute("DELETE FROM running WHERE job = ?", (row.job,))
         return row
 
-    def forget_failures(self) -> None:
-        """Remove the results of jobs that did not end by the rules of their task."""
+    def forget_failures(self, keys: Iterable[tuple[str, str, int]]) -> None:
+        """Remove the failed results of these policies, scenarios and seeds."""
+        query = "DELETE FROM results WHERE policy = ? AND scenario = ? AND seed = ? AND status != ?"
         with self._use() as db:
-            db.execute("DELETE FROM results WHERE status != ?", (str(Status.DONE),))
+            db.executemany(query, ((*key, str(Status.DONE)) for key in keys))
 
     def tidy(self) -> None:
         """Remove recorded episodes that no result names: of calls that were killed or forgotten."""
@@ -293,10 +296,12 @@ def open_results(
     """Read the rows of a run directory, and what was noted about the run.
 
     Returns:
-        Rows, notes, and for each job its metrics that are no columns.
+        Rows, notes with `read_left_out` among them, and for each job its metrics that are no
+        columns.
 
     Raises:
         InvalidInputError: if there are no results.
     """
     with reading(path) as db:
-        return read_rows(db), read_about(db), read_measured(db)
+        about = {**read_about(db), "left_out": read_left_out(db)}
+        return read_rows(db), about, read_measured(db)

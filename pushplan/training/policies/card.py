@@ -14,7 +14,7 @@ from pushplan.world import SchemaError
 
 ScoreRow = Mapping[str, Any]
 """A suite's scores: ``suite``, ``episodes``, ``success`` with ``success_low`` and ``success_high``,
-``scores`` (name -> mean, low, high), ``failures`` (reason -> count)."""
+``scores`` (name -> mean, low, high; of one episode the mean), ``failures`` (reason -> count)."""
 
 _WORDS = {
     "ppo": "PPO (Stable-Baselines3)",
