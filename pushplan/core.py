@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import copyreg
 import hashlib
 from pathlib import Path
+from types import ModuleType
 
-from pushplan.errors import PushplanError
+from pushplan.errors import PushplanError, refuse_copy
 
 try:
     from pushplan import _core
@@ -51,6 +53,12 @@ __all__ = [
     "scenarios",
     "search",
 ]
+
+
+for _room in vars(_core).values():
+    for _kind in vars(_room).values() if isinstance(_room, ModuleType) else ():
+        if isinstance(_kind, type) and not {"__getstate__", "_member_map_"} & vars(_kind).keys():
+            copyreg.pickle(_kind, refuse_copy)
 
 
 def is_stale() -> bool:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -42,6 +41,7 @@ class PymunkSimulator(Simulator):
 
     name = "pymunk"
     is_exact = True
+    engine_parts = ("_core", "_rows")
 
     def __init__(self, options: PymunkOptions | None = None) -> None:
         self.options = options or PymunkOptions()
@@ -97,15 +97,6 @@ class PymunkSimulator(Simulator):
             holds=options.holds_direction,
         )
         bodies.watch(self._core.contacts)
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Everything but what `_connect` makes."""
-        return {key: value for key, value in self.__dict__.items() if key != "_core"}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        if "_world" in state:
-            self._connect()
 
     def step(self, command: Twist, duration: float) -> Trace:
         """Drive at a body-frame velocity for ``duration`` [s]."""
