@@ -118,6 +118,18 @@ def test_a_simulator_goes_on_after_objects_were_removed_or_nothing_was_built(sim
         assert clone(engine).save() == engine.save()
 
 
+def test_contacts_are_solved_in_the_same_order_after_long_pushing():
+    env = PushEnv(task="ship_ice", variations={"concentration": 0.5}, observation="state")
+    env.reset(seed=1)
+    copies = []
+    for k in range(34):
+        if k % 5 == 1:
+            copies += [copy.deepcopy(env), copy.deepcopy(copies[-1] if copies else env)]
+        for one in (env, *copies):
+            one.step([0.3 * np.sin(k / 5)])
+    assert all(one.world == env.world for one in copies)
+
+
 def test_workers_are_not_copied():
     envs = WorkerVectorEnv([functools.partial(PushEnv, task="room")], workers=1)
     for clone in CLONES.values():

@@ -61,6 +61,7 @@ class PymunkBodies:
         self.space.collision_slop = slop
         self.space.iterations = iterations
         robot_mu, object_mu, static_mu = _shape_frictions(materials)
+        self._most = 0
         self._robot = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
         self._robot_shapes = self._make_robot(world, robot_mu)
         self._add_static(world, static_mu)
@@ -88,12 +89,41 @@ class PymunkBodies:
 
         self.functions = [address(ffi.addressof(self._lib, name)) for name in _FUNCTIONS]
         robot = (self._robot._body, [part._shape for part in self._robot_shapes])
-        bodies = [robot, *self._objects]
+        self._moving = bodies = [robot, *self._objects]
         self.handles = (
             address(self.space._space),
             [address(body) for body, _ in bodies],
             [[address(shape) for shape in shapes] for _, shapes in bodies],
         )
+
+    def history(self, most: int) -> tuple[int, int]:
+        """Numbers of shapes that came into the space so far, and at once, for `go_on_from`.
+
+        Args:
+            most: that the core had in the space at once.
+        """
+        return self._lib.cpSpaceGetShapeIDCounter(self.space._space), max(most, self._most)
+
+    def go_on_from(self, came: int, most: int) -> None:
+        """Solve contacts in the order in which a space with this `history` would.
+
+        The engine numbers shapes as they come, and lists them by these numbers in a table that
+        grows with what is in it at once.
+        """
+        lib = self._lib
+        space = self.space._space
+        bodies = [body for body, _ in self._moving]
+        shapes = [shape for _, own in self._moving for shape in own][:most]
+        for change, changed in (
+            (lib.cpSpaceAddBody, bodies),
+            (lib.cpSpaceAddShape, shapes),
+            (lib.cpSpaceRemoveShape, shapes),
+            (lib.cpSpaceRemoveBody, bodies),
+        ):
+            for one in changed:
+                change(space, one)
+        lib.cpSpaceSetShapeIDCounter(space, came)
+        self._most = most
 
     def watch(self, record: int) -> None:
         """Let the engine report contacts of moving and static shapes to a record of the core."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -41,7 +42,7 @@ class PymunkSimulator(Simulator):
 
     name = "pymunk"
     is_exact = True
-    engine_parts = ("_core", "_rows")
+    engine_parts = ("_bodies", "_core", "_rows")
 
     def __init__(self, options: PymunkOptions | None = None) -> None:
         self.options = options or PymunkOptions()
@@ -97,6 +98,17 @@ class PymunkSimulator(Simulator):
             holds=options.holds_direction,
         )
         bodies.watch(self._core.contacts)
+        self._bodies = bodies
+
+    def __getstate__(self) -> dict[str, Any]:
+        history = self._bodies.history(self._core.most_shapes) if hasattr(self, "_core") else ()
+        return {**super().__getstate__(), "history": history}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        history = state.pop("history", ())
+        super().__setstate__(state)
+        if history:
+            self._bodies.go_on_from(*history)
 
     def step(self, command: Twist, duration: float) -> Trace:
         """Drive at a body-frame velocity for ``duration`` [s]."""

@@ -116,6 +116,9 @@ class ChipmunkScene {
   /// Removes from states (1 + A,) the velocities that bodies do not keep for `h` [s] untouched.
   void slow(std::span<BodyState> states, double h) const;
 
+  /// Greatest number of shapes that were in the space at once.
+  std::size_t most() const { return most_; }
+
   /// The record; its address is for the engine's callbacks.
   StaticContacts& contacts() { return contacts_; }
 
@@ -130,6 +133,7 @@ class ChipmunkScene {
   std::vector<Index> active_;
   std::vector<cpBody*> bodies_;   // those that are loaded
   std::vector<cpShape*> shapes_;  // likewise
+  std::size_t most_ = 0;
   bool carried_ = false;          // true if a loaded body keeps some of its velocity
   double h_ = 0.0;
   Twist robot_;  // velocity that the robot was given last
