@@ -19,8 +19,6 @@ from pushplan.world.checks import FloatArray, integer
 
 _ELEVATION = -58.0
 _FIELD_OF_VIEW = 40.0
-_LONGEST = 2.0  # depth over width of what is shown
-_BEHIND = 0.2  # fraction of that which lies behind the robot
 _MOST_GEOMS = 20_000
 
 
@@ -79,18 +77,10 @@ class MujocoCamera:
         return np.ascontiguousarray(picture[::-1])
 
     def _aim(self, world: World) -> None:
-        """Far enough away for the bounds to fit into the picture both ways.
-
-        Of bounds that are much longer than wide, only a stretch that begins at the robot is shown.
-        """
-        low = world.static.bounds[:2].copy()
-        high = world.static.bounds[2:].copy()
+        """Far enough away for the bounds to fit into the picture both ways."""
+        low = world.static.bounds[:2]
+        high = world.static.bounds[2:]
         width, depth = (float(side) for side in high - low)
-        if depth > _LONGEST * width:
-            depth = _LONGEST * width
-            y = float(world.robot_pose[1]) - _BEHIND * depth
-            low[1] = min(max(y, float(low[1])), float(high[1]) - depth)
-            high[1] = low[1] + depth
         aspect = self.size[0] / self.size[1]
         half_view = math.tan(math.radians(0.5 * _FIELD_OF_VIEW))
         tilt = math.radians(-_ELEVATION)
