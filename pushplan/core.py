@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copyreg
 import hashlib
+from enum import Enum
 from pathlib import Path
 from types import ModuleType
 
@@ -57,8 +58,10 @@ __all__ = [
 
 for _room in vars(_core).values():
     for _kind in vars(_room).values() if isinstance(_room, ModuleType) else ():
-        if isinstance(_kind, type) and not {"__getstate__", "_member_map_"} & vars(_kind).keys():
+        if isinstance(_kind, type) and not issubclass(_kind, Enum):
             copyreg.pickle(_kind, refuse_copy)
+for _kind in (pushing.BoxContact, rearrangement.PushingController):
+    copyreg.pickle(_kind, lambda one: (type(one), one.numbers))
 
 
 def is_stale() -> bool:

@@ -8,11 +8,9 @@
 
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <span>
 #include <stdexcept>
 #include <string>
-#include <type_traits>
 #include <vector>
 
 #include "pushplan/array.hpp"
@@ -43,21 +41,6 @@ class Refusal : public std::invalid_argument {
 [[noreturn]] inline void refuse(const char* name, const std::string& value,
                                 const std::string& rule) {
   throw Refusal(std::string(name) + " must be " + rule + ", got " + value);
-}
-
-/// The bytes of a plain struct, for copies and pickles of it.
-template <class T>
-  requires std::is_trivially_copyable_v<T>
-nb::bytes bytes_of(const T& value) {
-  return nb::bytes(&value, sizeof(T));
-}
-
-/// Makes a plain struct again from its bytes.
-template <class T>
-  requires std::is_trivially_copyable_v<T>
-void make_from_bytes(T& value, const nb::bytes& bytes) {
-  if (bytes.size() != sizeof(T)) refuse("state", std::to_string(bytes.size()), "of this version");
-  std::memcpy(&value, bytes.data(), sizeof(T));
 }
 
 /// Requires an array to have exactly so many elements, rows or columns.

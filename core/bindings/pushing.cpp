@@ -51,8 +51,11 @@ void bind_contact(nb::module_& module) {
           },
           "front"_a, "half"_a, "curvature"_a, "depth"_a, "low"_a, "high"_a, "spread"_a,
           "friction"_a)
-      .def("__getstate__", &bytes_of<BoxContact>)
-      .def("__setstate__", &make_from_bytes<BoxContact>)
+      .def_prop_ro("numbers",
+                   [](const BoxContact& self) {
+                     return std::tuple(self.front, self.half, self.curvature, self.depth, self.low,
+                                       self.high, self.spread, self.friction);
+                   })
       .def_ro("front", &BoxContact::front, "X of the bumper in its middle, from the axle [m].")
       .def_ro("half", &BoxContact::half, "Half the bumper's width [m].")
       .def_ro("curvature", &BoxContact::curvature, "Curvature of the bumper's front [1/m].")

@@ -24,8 +24,6 @@ LONGEST = 1.6
 times the shorter side."""
 SHORT = 6.0
 """Length of the dashes of a plan at least, at 600 px [px]."""
-SMALLEST = 3.0
-"""Radius of a robot at least, at 600 px [px]."""
 RIM = 0.02
 """Fraction of the longer side that walls outside the bounds add to a picture on each side."""
 
@@ -185,11 +183,8 @@ def pushed(world: World, plan: Plan | None) -> list[tuple[FloatArray, tuple[Floa
 
 
 def _robot(canvas: Canvas, world: World, palette: Palette) -> None:
-    """The bumper's parts as one shape, the chassis on it, and an arrow where it faces.
-
-    A robot that is too small for that is a dot.
-    """
-    least = canvas.metres(SMALLEST)
+    """The bumper's parts as one shape, the chassis on it, and an arrow; a dot if it is tiny."""
+    least = canvas.metres(3.0)
     if world.robot.circumscribed_radius < least:
         canvas.disc(world.robot_pose[:2], least, palette.robot, palette.robot_edge)
         return

@@ -64,7 +64,7 @@ class Renderer:
         if self._mode == "human":
             if self._window is None:
                 self._window = Window("pushplan", fps=self.metadata["render_fps"])
-            self._window.show(_picture(world, follows=True))
+            self._window.show(_picture(world))
 
     def close(self) -> None:
         """Close the window, if there is one; may be called again."""
@@ -73,7 +73,7 @@ class Renderer:
             self._window = None
 
 
-def _picture(world: World, *, follows: bool = False) -> NDArray[np.uint8]:
-    from pushplan.drawing.top_view import draw_world, film_view  # most runs draw nothing
+def _picture(world: World) -> NDArray[np.uint8]:
+    from pushplan.drawing import draw_world  # most runs draw nothing
 
-    return draw_world(world, view=film_view(world) if follows else None)
+    return draw_world(world)

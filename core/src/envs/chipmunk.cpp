@@ -77,7 +77,6 @@ void ChipmunkScene::load(std::span<const Index> active, std::span<const BodyStat
       carried_ = carried_ || momentum_.keeps[static_cast<std::size_t>(k + 1)] > 0.0;
     }
     for (cpBody* body : bodies_) engine_.add_body(handles_.space, body);
-    most_ = std::max(most_, shapes_.size());
   }
   write(states);  // first, as the broad phase remembers where a shape was when it came
   for (cpShape* shape : shapes_) engine_.add_shape(handles_.space, shape);

@@ -61,7 +61,6 @@ class PymunkBodies:
         self.space.collision_slop = slop
         self.space.iterations = iterations
         robot_mu, object_mu, static_mu = _shape_frictions(materials)
-        self._most = 0
         self._robot = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
         self._robot_shapes = self._make_robot(world, robot_mu)
         self._add_static(world, static_mu)
@@ -96,19 +95,15 @@ class PymunkBodies:
             [[address(shape) for shape in shapes] for _, shapes in bodies],
         )
 
-    def history(self, most: int) -> tuple[int, int]:
-        """Numbers of shapes that came into the space so far, and at once, for `go_on_from`.
-
-        Args:
-            most: that the core had in the space at once.
-        """
-        return self._lib.cpSpaceGetShapeIDCounter(self.space._space), max(most, self._most)
+    @property
+    def shapes_so_far(self) -> int:
+        """Number of times that a shape came into the space."""
+        return int(self._lib.cpSpaceGetShapeIDCounter(self.space._space))
 
     def go_on_from(self, came: int, most: int) -> None:
-        """Solve contacts in the order in which a space with this `history` would.
+        """Solve contacts in the order of a space into which so many shapes came, ``most`` at once.
 
-        The engine numbers shapes as they come, and lists them by these numbers in a table that
-        grows with what is in it at once.
+        The engine numbers shapes as they come, and lists them by number in a table that grows.
         """
         lib = self._lib
         space = self.space._space
@@ -123,7 +118,6 @@ class PymunkBodies:
             for one in changed:
                 change(space, one)
         lib.cpSpaceSetShapeIDCounter(space, came)
-        self._most = most
 
     def watch(self, record: int) -> None:
         """Let the engine report contacts of moving and static shapes to a record of the core."""

@@ -64,20 +64,15 @@ class PymunkSimulator(Simulator):
         # (1 + K, 6) poses and twists, which the core changes
         self._rows = np.concatenate([robot_row[None], objects])
         self._held = self._touched = False
-        self._connect()
-
-    def _connect(self) -> None:
-        """Make the objects of the engine and of the core, which the rest decides."""
         options = self.options
-        robot = self._world.robot
-        movables = self._world.movables
+        movables = world.movables
         bodies = PymunkBodies(
-            self._world,
-            self._materials,
+            world,
+            materials,
             slop=options.slop * self._size,
             iterations=options.iterations,
         )
-        momentum = Momentum.of(self._world, self._materials)
+        momentum = Momentum.of(world, materials)
         self._core = core.PlanarSimulator(
             bodies.functions,
             *bodies.handles,
@@ -85,7 +80,7 @@ class PymunkSimulator(Simulator):
             reach=core.Reach(
                 robot.vertices, robot.offsets, movables.vertices, movables.offsets, movables.radii
             ),
-            obstacles=obstacles_of(self._world.static),
+            obstacles=obstacles_of(world.static),
             keeps=momentum.keeps,
             inertia=momentum.inertia,
             drag=momentum.drag,
@@ -101,14 +96,17 @@ class PymunkSimulator(Simulator):
         self._bodies = bodies
 
     def __getstate__(self) -> dict[str, Any]:
-        history = self._bodies.history(self._core.most_shapes) if hasattr(self, "_core") else ()
-        return {**super().__getstate__(), "history": history}
+        state = super().__getstate__()
+        if "_core" in self.__dict__:
+            state["history"] = self._bodies.shapes_so_far, self._core.most_shapes
+        return state
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        history = state.pop("history", ())
+        came, most = state.pop("history", (0, 0))
         super().__setstate__(state)
-        if history:
-            self._bodies.go_on_from(*history)
+        if most:
+            self._bodies.go_on_from(came, most)
+            self._core.most_shapes = most
 
     def step(self, command: Twist, duration: float) -> Trace:
         """Drive at a body-frame velocity for ``duration`` [s]."""

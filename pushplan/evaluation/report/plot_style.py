@@ -60,13 +60,6 @@ def add_legend(figure: Figure) -> None:
     figure.legend(found.values(), names, loc="outside lower center", ncols=columns, frameon=False)
 
 
-def few_ticks(axes: Any, axis: Any = "both") -> None:
-    """Three or four numbers on an axis of a small panel."""
-    axes.locator_params(axis=axis, nbins=3, min_n_ticks=3)
-    for one in (axes.xaxis, axes.yaxis) if axis == "both" else (axes.xaxis,):
-        one.set_major_formatter("{x:g}")
-
-
 def unclipped(*artists: Any) -> None:
     """Let markers at the limit of a score be whole."""
     for artist in artists:

@@ -18,7 +18,6 @@ from pushplan.evaluation.report.plot_style import (
     LINE,
     add_legend,
     dots,
-    few_ticks,
     interval,
     line,
     tidy,
@@ -107,7 +106,7 @@ def _tradeoff(run: StoredRun) -> Figure | None:
         )
         unclipped(points, bar.lines[0])
         axes.margins(0.08)
-        few_ticks(axes)
+        axes.locator_params(nbins=4, min_n_ticks=3)
 
     labels = ("effort I (1 = pushed nothing)", "efficiency E (1 = shortest path)")
     figure = _panels(run, ("I_nav", "I_manip"), cloud, labels)
@@ -185,7 +184,7 @@ def _boxes(
         unclipped(_cloud(axes, values, places, place, s=6, alpha=0.55, zorder=3))
     axes.set_yticks(range(len(policies)), list(map(wrapped, policies)), fontsize=7.0)
     axes.set_ylim(len(policies) - 0.4, -0.6)
-    few_ticks(axes, "x")
+    axes.locator_params(axis="x", nbins=3, min_n_ticks=3)
     tidy(axes)
 
 
@@ -209,7 +208,7 @@ def _profiles(run: StoredRun) -> Figure | None:
             axes.fill_between(thresholds, found.low, found.high, **band)
         axes.set_xlabel(f"{heading(name)} above")
         axes.set_ylim(0.0, 1.02)
-        few_ticks(axes, "x")
+        axes.locator_params(axis="x", nbins=3, min_n_ticks=3)
 
     return _sheet(kinds, panel, "fraction of episodes", sharex=False)
 
@@ -325,8 +324,9 @@ def _intervals(run: StoredRun) -> Figure:
     figure.set_figheight(LINE * below + 0.5)
     for axes, names in zip(panels, [["success"], *columns.values()], strict=True):
         axes.set_xlabel(names[0] if len(names) == 1 else names[0][0])
+        axes.locator_params(axis="x", nbins=3, min_n_ticks=3)
+        axes.xaxis.set_major_formatter("{x:g}")
         axes.margins(x=0.08)
-        few_ticks(axes, "x")
         tidy(axes)
         axes.tick_params(axis="y", length=0)
     panels[0].set_xlim(-0.06, 1.06)

@@ -116,8 +116,8 @@ class ChipmunkScene {
   /// Removes from states (1 + A,) the velocities that bodies do not keep for `h` [s] untouched.
   void slow(std::span<BodyState> states, double h) const;
 
-  /// Greatest number of shapes that were in the space at once.
-  std::size_t most() const { return most_; }
+  /// Number of shapes that are loaded.
+  std::size_t shape_count() const { return shapes_.size(); }
 
   /// The record; its address is for the engine's callbacks.
   StaticContacts& contacts() { return contacts_; }
@@ -133,7 +133,6 @@ class ChipmunkScene {
   std::vector<Index> active_;
   std::vector<cpBody*> bodies_;   // those that are loaded
   std::vector<cpShape*> shapes_;  // likewise
-  std::size_t most_ = 0;
   bool carried_ = false;          // true if a loaded body keeps some of its velocity
   double h_ = 0.0;
   Twist robot_;  // velocity that the robot was given last

@@ -52,13 +52,13 @@ class PlanarSimulator {
   StaticContacts& contacts() { return scene_.contacts(); }
   /// Number of objects that the engine simulated in the last step that needed it.
   std::size_t loaded() const { return active_.size(); }
-  /// Greatest number of shapes that were in the engine at once.
-  std::size_t most_shapes() const { return scene_.most(); }
   /// Number of objects.
   std::size_t count() const { return poses_.size(); }
 
   /// True if objects that cannot move are simulated as well: a reference for tests.
   bool loads_all = false;
+  /// Greatest number of shapes that were in the engine at once.
+  std::size_t most_shapes = 0;
 
  private:
   template <class Run>
