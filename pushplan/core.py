@@ -60,8 +60,8 @@ for _room in vars(_core).values():
     for _kind in vars(_room).values() if isinstance(_room, ModuleType) else ():
         if isinstance(_kind, type) and not issubclass(_kind, Enum):
             copyreg.pickle(_kind, refuse_copy)
-for _kind in (pushing.BoxContact, rearrangement.PushingController):
-    copyreg.pickle(_kind, lambda one: (type(one), one.numbers))
+copyreg.pickle(pushing.BoxContact, lambda one: (type(one), one.numbers))
+copyreg.pickle(rearrangement.PushingController, lambda one: (type(one), one.numbers))
 
 
 def is_stale() -> bool:

@@ -59,13 +59,12 @@ class PymunkSimulator(Simulator):
         self._world = world
         self._time = world.time
         assert world.robot_twist is not None
-        robot_row = np.concatenate([world.robot_pose, world.robot_twist])
-        objects = np.concatenate([world.movables.poses, world.movables.twists], axis=1)
+        movables = world.movables
+        poses = np.vstack([world.robot_pose, movables.poses])
         # (1 + K, 6) poses and twists, which the core changes
-        self._rows = np.concatenate([robot_row[None], objects])
+        self._rows = np.hstack([poses, np.vstack([world.robot_twist, movables.twists])])
         self._held = self._touched = False
         options = self.options
-        movables = world.movables
         bodies = PymunkBodies(
             world,
             materials,
@@ -156,11 +155,10 @@ class PymunkSimulator(Simulator):
 
     def restore(self, state: SimulatorState) -> None:
         """Go back to a saved state of the same scene."""
-        robot = np.concatenate([state.robot_pose, state.robot_twist])
-        objects = np.concatenate([state.object_poses, state.object_twists], axis=1)
         self._time = state.time
         self._held = self._touched = False
-        self._rows[:] = np.concatenate([robot[None], objects])
+        self._rows[:, :3] = np.vstack([state.robot_pose, state.object_poses])
+        self._rows[:, 3:] = np.vstack([state.robot_twist, state.object_twists])
 
     def remove(self, object_ids: Sequence[int]) -> None:
         """Take objects off the floor."""
