@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import copyreg
 import hashlib
+from enum import Enum
 from pathlib import Path
+from types import ModuleType
 
-from pushplan.errors import PushplanError
+from pushplan.errors import PushplanError, refuse_copy
 
 try:
     from pushplan import _core
@@ -53,6 +56,14 @@ __all__ = [
     "scenarios",
     "search",
 ]
+
+
+for _room in vars(_core).values():
+    for _kind in vars(_room).values() if isinstance(_room, ModuleType) else ():
+        if isinstance(_kind, type) and not issubclass(_kind, Enum):
+            copyreg.pickle(_kind, refuse_copy)
+copyreg.pickle(pushing.BoxContact, lambda one: (type(one), one.numbers))
+copyreg.pickle(rearrangement.PushingController, lambda one: (type(one), one.numbers))
 
 
 def is_stale() -> bool:

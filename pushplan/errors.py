@@ -6,6 +6,7 @@ import difflib
 import os
 import reprlib
 from collections.abc import Iterable
+from typing import NoReturn
 
 LONGEST_MESSAGE = 300
 """Most characters of a message; of a longer one, the middle is left out."""
@@ -59,6 +60,14 @@ class ScenarioError(InvalidInputError):
 
 class MissingDependencyError(PushplanError, ImportError):
     """An optional library is needed; the message says which extra installs it."""
+
+
+def refuse_copy(one: object, _protocol: object = None) -> NoReturn:
+    """Raise a `PushplanError`; as ``__reduce_ex__`` of a class it says that there are no copies."""
+    raise PushplanError(
+        f"a {type(one).__name__} cannot be copied or pickled, as its memory is outside Python or "
+        "in other threads: make another one, or copy a policy before reset()"
+    )
 
 
 def unknown_name_message(kind: str, name: object, choices: Iterable[str]) -> str:

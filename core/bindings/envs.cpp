@@ -137,6 +137,8 @@ void bind_envs(nb::module_& module) {
            "limit"_a, "Time [s] for which the robot certainly touches nothing.")
       .def_prop_ro("loaded", &PlanarSimulator::loaded,
                    "Number of objects that the last step needed the engine for.")
+      .def_rw("most_shapes", &PlanarSimulator::most_shapes,
+              "Greatest number of shapes that were in the engine at once.")
       .def_rw("loads_all", &PlanarSimulator::loads_all,
               "True if objects that cannot move are simulated as well.")
       .def_prop_ro("contacts", [](PlanarSimulator& self) {

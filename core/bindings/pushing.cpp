@@ -1,4 +1,5 @@
 #include <nanobind/stl/pair.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
@@ -51,6 +52,11 @@ void bind_contact(nb::module_& module) {
           },
           "front"_a, "half"_a, "curvature"_a, "depth"_a, "low"_a, "high"_a, "spread"_a,
           "friction"_a)
+      .def_prop_ro("numbers",
+                   [](const BoxContact& self) {
+                     return std::tuple(self.front, self.half, self.curvature, self.depth, self.low,
+                                       self.high, self.spread, self.friction);
+                   })
       .def_ro("front", &BoxContact::front, "X of the bumper in its middle, from the axle [m].")
       .def_ro("half", &BoxContact::half, "Half the bumper's width [m].")
       .def_ro("curvature", &BoxContact::curvature, "Curvature of the bumper's front [1/m].")

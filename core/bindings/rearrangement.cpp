@@ -362,6 +362,11 @@ void bind_pushes(nb::module_& module) {
             new (self) PushingController{step, turn, size, half_width, front, ahead, gain};
           },
           "step"_a, "turn"_a, "size"_a, "half"_a, "front"_a, "ahead"_a, "gain"_a)
+      .def_prop_ro("numbers",
+                   [](const PushingController& self) {
+                     return std::tuple(self.step, self.turn, self.size, self.half_width,
+                                       self.front, self.ahead, self.gain);
+                   })
       .def_ro("step", &PushingController::step, "Distance between two commands [m].")
       .def_ro("turn", &PushingController::turn, "Greatest turn in one step [rad].")
       .def_ro("ahead", &PushingController::ahead,

@@ -12,7 +12,7 @@ from scipy.interpolate import make_interp_spline
 
 from pushplan.cli.keyboard import HELP, Keyboard, twist_of
 from pushplan.cli.scoreboard import Scoreboard, closing_lines
-from pushplan.drawing import draw_world
+from pushplan.drawing.top_view import draw_world, film_view
 from pushplan.evaluation.run.recording import Recording
 from pushplan.world import Episode, Policy, Twist, World
 from pushplan.world.checks import FloatArray, IntArray
@@ -156,7 +156,7 @@ class Cockpit:
 
     def _show(self, world: World, text: list[str], *newest: FloatArray) -> None:
         trail = np.concatenate([*self._trail, *newest])
-        self._display.show(draw_world(world, trail=trail, text=text))
+        self._display.show(draw_world(world, view=film_view(world), trail=trail, text=text))
 
     def _wait(self, due: float) -> None:
         self._look()

@@ -23,7 +23,7 @@ from pushplan.drawing import (
 )
 from pushplan.drawing.figure import FORMATS
 from pushplan.drawing.files import Frame
-from pushplan.drawing.top_view import pushed
+from pushplan.drawing.top_view import film_view, pushed
 from pushplan.interaction.path_sweepers import default_interaction
 from pushplan.world import Episode, Plan, Policy, World
 from pushplan.world.policy_abilities import shown_plan
@@ -88,6 +88,7 @@ class Camera:
         board = Scoreboard(episode.world)
         seen = 1
         legend = self._legend()
+        view = film_view(episode.world)
         for index in chosen:
             world, plan = self._steps[index]
             now = int(np.searchsorted(episode.times, world.time + 1e-9))
@@ -97,6 +98,9 @@ class Camera:
             text = board.lines()
             if index == chosen[-1]:
                 text = [text[0], "   ".join(closing_lines(episode))]
-            frame = add_strips(draw_world(world, plan=plan, trail=trail), text, legend)
+            if view is not None:
+                text = [*text, "the picture follows the robot along the map"]
+            picture = draw_world(world, view=view, plan=plan, trail=trail)
+            frame = add_strips(picture, text, legend)
             yield frame
         yield from repeat(frame, FPS)  # a second to look at the end

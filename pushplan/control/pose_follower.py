@@ -6,7 +6,7 @@ import math
 
 from pushplan.control.limits import arc_twist
 from pushplan.control.progress_checker import ProgressChecker, StallChecker, decrease_by
-from pushplan.world import RobotModel, Twist
+from pushplan.world import RobotModel, Twist, World
 from pushplan.world.checks import FloatArray, array, expect
 
 _PATIENCE = 3.0
@@ -31,6 +31,10 @@ class PoseFollower:
         self._next = 1
         self._stall = StallChecker(robot)
         self._progress: ProgressChecker[float] | None = None
+
+    def drive(self, world: World, held: float) -> Twist | None:
+        """`command` for where and when the robot is in a world."""
+        return self.command(world.robot_pose, world.time, held)
 
     def command(self, pose: FloatArray, time: float, held: float) -> Twist | None:
         """The velocity to drive now; None when it is there, or does not get there.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from copy import copy
+from functools import partial
 from typing import Generic, TypeVar
 
 from pushplan.world import RobotModel, Twist
@@ -55,7 +56,11 @@ class ProgressChecker(Generic[Seen]):
 
 def decrease_by(least: float) -> Callable[[float, float], bool]:
     """Progress of a quantity that has to become less, each time by more than ``least``."""
-    return lambda best, left: left < best - least
+    return partial(_is_less, least)
+
+
+def _is_less(least: float, best: float, left: float) -> bool:
+    return left < best - least
 
 
 class PoseProgressChecker(ProgressChecker[FloatArray]):

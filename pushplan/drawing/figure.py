@@ -15,7 +15,7 @@ from pushplan.drawing.canvas import NOMINAL_PX, Canvas
 from pushplan.drawing.ground import draw_ground
 from pushplan.drawing.legend import Entry, legend_of
 from pushplan.drawing.palette import SERIES, Color, palette_of
-from pushplan.drawing.top_view import draw_moving, view_bounds
+from pushplan.drawing.top_view import LONGEST, draw_moving, view_bounds
 from pushplan.files.output_files import write_atomic
 from pushplan.imports.on_demand import need
 from pushplan.world import InvalidInputError, Plan, World
@@ -24,8 +24,10 @@ from pushplan.world.checks import FloatArray, array, number
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-COLUMN = 3.4
+COLUMN = 3.3
 """Width of a column of a two-column paper [inch]."""
+TEXT = 4.75
+"""Width of the text of LaTeX's class ``article`` [inch]."""
 FORMATS = (".png", ".svg", ".pdf")
 DPI = 200
 STYLE: Any = {
@@ -41,10 +43,12 @@ STYLE: Any = {
 """Settings of Matplotlib for figures that are printed as they are, one column wide."""
 # around the axes [inch]
 _LEFT = 0.55
-_RIGHT = 0.08
+_RIGHT = 0.16
+_GAP = 0.08
+_LOWEST = 0.4  # that is left for a low scene, whose axis has a label
 _TITLE = 0.15
 _BELOW = 0.4
-_ENTRY = (1.12, 0.18)  # of the legend: width and height [inch]
+_ENTRY = (1.09, 0.18)  # of the legend: width and height [inch]
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,26 +103,34 @@ def draw_figure(*panels: Panel, width_in: float = COLUMN, columns: int | None = 
     across = max(1, int(width_in / _ENTRY[0]))
     boxes = [np.array(view_bounds(panel.world, 600, None)) for panel in panels]
     side = width_in / columns - _LEFT - _RIGHT
-    heights = [side * float((box[3] - box[1]) / (box[2] - box[0])) for box in boxes]
-    above = _RIGHT + _TITLE * max(len(panel.title.splitlines()) for panel in panels)
-    lines = [max(heights[i : i + columns]) for i in range(0, len(panels), columns)]
-    below = _ENTRY[1] * -(-len(entries) // across) + _RIGHT
+    sizes = [_size(box[2:] - box[:2], side) for box in boxes]
+    above = _GAP + _TITLE * max(len(panel.title.splitlines()) for panel in panels)
+    cells = [max(high, _LOWEST) for _, high in sizes]
+    lines = [max(cells[i : i + columns]) for i in range(0, len(panels), columns)]
+    below = _ENTRY[1] * -(-len(entries) // across) + _GAP
     height = below + sum(lines) + len(lines) * (above + _BELOW)
     with matplotlib.rc_context(STYLE):
         figure: Figure = matplotlib.figure.Figure(figsize=(width_in, height))
         for n, (panel, box) in enumerate(zip(panels, boxes, strict=True)):
             row, column = divmod(n, columns)
             top = height - sum(lines[:row]) - row * _BELOW - (row + 1) * above
-            left = column * width_in / columns + _LEFT
-            low = top - heights[n]
-            place = (left / width_in, low / height, side / width_in, heights[n] / height)
+            wide, high = sizes[n]
+            left = column * width_in / columns + _LEFT + 0.5 * (side - wide)
+            low = top - 0.5 * (cells[n] + high)
+            place = (left / width_in, low / height, wide / width_in, high / height)
             axes = figure.add_axes(place)
-            _draw(axes, panel, box, max(side, heights[n]))
+            _draw(axes, panel, box, max(wide, high))
             axes.set_xlabel("x [m]" if n + columns >= len(panels) else "")
             axes.set_ylabel("" if column else "y [m]", labelpad=1.0)
         handles = [_handle(entry) for entry in entries.values()]
         figure.legend(handles=handles, loc="lower center", ncols=across, frameon=False)
     return figure
+
+
+def _size(sides: FloatArray, width_in: float) -> tuple[float, float]:
+    """Width and height [inch] of a scene with such sides in a cell; tall ones are narrower."""
+    height = min(width_in * float(sides[1] / sides[0]), LONGEST * width_in)
+    return height * float(sides[0] / sides[1]), height
 
 
 def save_figure(path: str | Path, figure: Figure, *, title: str = "", source: str = "") -> None:

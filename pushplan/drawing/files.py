@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import subprocess
+import itertools
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -75,28 +75,16 @@ def _write_gif(path: Path, first: Frame, rest: Iterable[Frame], fps: float) -> N
 
 
 def _write_mp4(path: Path, first: Frame, rest: Iterable[Frame], fps: float) -> None:
-    imageio_ffmpeg = need("imageio_ffmpeg")
     height, width = first.shape[:2]
-    command = [
-        imageio_ffmpeg.get_ffmpeg_exe(),
-        *("-y", "-loglevel", "error"),
-        *("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{fps:g}"),
-        *("-i", "-", "-an", "-vcodec", "libx264", "-crf", "20"),
-        # players want even sides and this pixel format
-        *("-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p", str(path)),
-    ]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as process:
-        assert process.stdin is not None and process.stderr is not None
-        try:
-            process.stdin.write(np.ascontiguousarray(first).tobytes())
-            for frame in rest:
-                process.stdin.write(np.ascontiguousarray(frame).tobytes())
-            process.stdin.close()
-        except BrokenPipeError:
-            pass  # ffmpeg says why below
-        problem = process.stderr.read().decode(errors="replace").strip()
-    if process.returncode != 0:
-        raise InvalidInputError(f"ffmpeg could not write {path}: {problem or process.returncode}")
+    # players want even sides and this pixel format, which is the default
+    output = ["-crf", "20", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2"]
+    film = need("imageio_ffmpeg").write_frames(
+        str(path), (width, height), fps=fps, quality=None, macro_block_size=1, output_params=output
+    )
+    film.send(None)
+    for frame in itertools.chain([first], rest):
+        film.send(np.ascontiguousarray(frame))
+    film.close()
 
 
 def _checked(path: str | Path, endings: tuple[str, ...]) -> Path:

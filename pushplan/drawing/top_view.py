@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -19,8 +20,8 @@ from pushplan.world.outline import transform
 Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
 LONG = 2.5
 LONGEST = 1.6
-"""Of a world whose longer side is more than `LONG` times the shorter one, a picture shows
-`LONGEST` times the shorter side by default."""
+"""Of a world whose longer side is more than `LONG` times the shorter one, a film shows `LONGEST`
+times the shorter side."""
 SHORT = 6.0
 """Length of the dashes of a plan at least, at 600 px [px]."""
 RIM = 0.02
@@ -45,8 +46,8 @@ def draw_world(
     Args:
         world: what to draw; objects on casters are light, the others dark.
         size_px: longer side of the picture [px].
-        view: length of the world's longer side that is shown [m]; the picture then follows the
-            robot. By default all of it, unless the world is very long.
+        view: length of the world's longer side that is shown [m], all of it by default; the
+            picture then follows the robot. Films take that of `film_view`.
         plan: drawn as a dashed line, with the paths on which it expects objects to be pushed and
             their outlines at the end.
         trail: (N, 2) or (N, 3) positions where the robot has been [m].
@@ -129,6 +130,12 @@ def draw_moving(
     _robot(canvas, world, palette)
 
 
+def film_view(world: World) -> float | None:
+    """Length of the world's longer side that a film shows [m]; None for all of it."""
+    short, long = sorted((world.static.bounds[2:] - world.static.bounds[:2]).tolist())
+    return LONGEST * short if long > LONG * short else None
+
+
 def view_bounds(world: World, size_px: int, view: float | None) -> Bounds:
     """Return the part of the world that is shown: x_min, y_min, x_max, y_max [m]."""
     box = _with_walls(world.static)
@@ -136,11 +143,7 @@ def view_bounds(world: World, size_px: int, view: float | None) -> Bounds:
     high = box[2:].copy()
     sides = high - low
     axis = int(np.argmax(sides))
-    length = float(sides[axis])
-    if length > LONG * float(sides.min()):
-        length = LONGEST * float(sides.min())
-    if view is not None:
-        length = number("view", view, low=0.0, open_low=True)
+    length = math.inf if view is None else number("view", view, low=0.0, open_low=True)
     if length < sides[axis]:
         start = float(world.robot_pose[axis]) - 0.5 * length
         start = min(max(start, float(low[axis])), float(high[axis]) - length)
@@ -180,7 +183,11 @@ def pushed(world: World, plan: Plan | None) -> list[tuple[FloatArray, tuple[Floa
 
 
 def _robot(canvas: Canvas, world: World, palette: Palette) -> None:
-    """The bumper's parts as one shape, the chassis on it, and an arrow where it faces."""
+    """The bumper's parts as one shape, the chassis on it, and an arrow; a dot if it is tiny."""
+    least = canvas.metres(3.0)
+    if world.robot.circumscribed_radius < least:
+        canvas.disc(world.robot_pose[:2], least, palette.robot, palette.robot_edge)
+        return
     chassis, *bumper = world.robot_outline_world()
     for part in (chassis, *bumper):
         canvas.polygon(part, None, palette.robot_edge, 2.5)

@@ -40,6 +40,10 @@ class Renderer:
         self._simulator = simulator
         self._window: Window | None = None
 
+    def __getstate__(self) -> dict[str, Any]:
+        """A copy opens a window of its own."""
+        return {**self.__dict__, "_window": None}
+
     @property
     def metadata(self) -> dict[str, Any]:
         """Render modes that work here: a window needs a display, a camera an engine with one."""

@@ -19,6 +19,7 @@ from gymnasium.vector.utils import (
 )
 from numpy.typing import ArrayLike, NDArray
 
+from pushplan.errors import refuse_copy
 from pushplan.world import InvalidInputError, PushplanError, UnknownNameError
 from pushplan.world.checks import integer
 
@@ -59,6 +60,8 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
         InvalidInputError: if there is no environment, or a number makes no sense.
         UnknownNameError: if the mode is unknown; the message lists the valid ones.
     """
+
+    __reduce_ex__ = refuse_copy
 
     def __init__(
         self,

@@ -45,6 +45,7 @@ class Network:
     """
 
     def __init__(self, data: bytes) -> None:
+        self._data = data
         self._runtime = _runtime()
         options = self._runtime.SessionOptions()
         # sums depend on the number of threads, and worker processes have a core each
@@ -76,6 +77,10 @@ class Network:
             )
         (self.input,) = doors.values()
         (self.output,) = outputs
+
+    def __reduce__(self) -> tuple[type[Network], tuple[bytes]]:
+        """A copy has a session of its own."""
+        return Network, (self._data,)
 
     def run(
         self, seen: NDArray[Any], noise: NDArray[np.float32] | None = None, *, timed: bool = False

@@ -15,7 +15,7 @@ import numpy as np
 
 from pushplan.control import waiting_twist
 from pushplan.control.limits import driven_twist
-from pushplan.errors import describe
+from pushplan.errors import describe, refuse_copy
 from pushplan.interaction import ContactParameters
 from pushplan.runtime.command import Command, CommandStatus, RunLog
 from pushplan.runtime.held_actions import drivable
@@ -105,6 +105,8 @@ class Runner:
         ...         runner.update(perception())  # any thread, any rate
         ...         send(runner.command(now()).twist)
     """
+
+    __reduce_ex__ = refuse_copy
 
     def __init__(
         self,

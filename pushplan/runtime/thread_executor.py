@@ -10,7 +10,7 @@ from traceback import format_tb
 from typing import Any, Generic, TypeVar
 
 from pushplan.control.executors import ExpectedTime
-from pushplan.errors import describe
+from pushplan.errors import describe, refuse_copy
 from pushplan.world import Cancellation, OwnBudget, PushplanError, Stop
 
 T = TypeVar("T")
@@ -32,6 +32,7 @@ class ThreadExecutor:
     """
 
     takes_time = True
+    __reduce_ex__ = refuse_copy
 
     def __init__(self, stop: Stop, clock: Callable[[], float]) -> None:
         self._stop = stop

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +11,11 @@ import pytest
 from conftest import make_u_maze
 from PIL import Image
 
+from pushplan.cli import film
 from pushplan.cli.film import Camera
 from pushplan.cli.scoreboard import Scoreboard, closing_lines
 from pushplan.metrics import manipulation_scores, navigation_scores
-from pushplan.world import ClearanceArea, Episode, Plan, Receptacle, World
+from pushplan.world import ClearanceArea, Episode, Plan, Receptacle, StaticMap, World
 
 AREA = ClearanceArea([[2, 6], [9, 6], [9, 12], [2, 12]], [True, True, False, True])
 
@@ -81,9 +83,31 @@ def test_films_follow_an_episode(name: str, tmp_path: Path) -> None:
     for step in range(len(episode.times)):
         camera(step, episode.world_at(step), Nobody())  # type: ignore[arg-type]
     camera.write(episode)
-    with Image.open(tmp_path / name) as film:
-        assert getattr(film, "n_frames", 1) == (1 if name == "a.png" else 6)
+    with Image.open(tmp_path / name) as shown_film:
+        assert getattr(shown_film, "n_frames", 1) == (1 if name == "a.png" else 6)
     assert closing_lines(episode)[0] == "stopped"
+
+
+@pytest.mark.parametrize(("length", "follows"), [(20.0, False), (60.0, True)])
+def test_films_of_long_maps_say_that_the_picture_follows(
+    length: float, follows: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    start = make_u_maze([[4, 9, 0.3]], goal=AREA)
+    floor = StaticMap.build(bounds=[0, 0, 15, length])
+    episode = wander(replace(start, static=floor), steps=3)
+    frames = []
+    monkeypatch.setattr(
+        film, "add_strips", lambda picture, text, _: frames.append((picture.shape, text)) or picture
+    )
+    for name in ("a.gif", "a.pdf"):
+        camera = Camera(str(tmp_path / name))
+        for step in range(3):
+            camera(step, episode.world_at(step), Nobody())  # type: ignore[arg-type]
+        camera.write(episode)
+    assert len(frames) == 3 and len({len(text) for _, text in frames}) == 1
+    for (rows, columns, _), text in frames:
+        assert any("follows the robot" in line for line in text) == follows
+        assert rows / columns == pytest.approx(1.6 if follows else length / 15, rel=0.01)
 
 
 class Ahead(Nobody):
@@ -108,7 +132,7 @@ def test_plans_that_predict_nothing_are_shown_with_a_prediction(tmp_path: Path) 
         for step in range(3):
             camera(step, episode.world, policy)  # type: ignore[arg-type]
         camera.write(episode)
-        with Image.open(tmp_path / "a.gif") as film:
-            picture = np.asarray(film.convert("RGB")).astype(int)
+        with Image.open(tmp_path / "a.gif") as shown_film:
+            picture = np.asarray(shown_film.convert("RGB")).astype(int)
         purple = (np.abs(picture - [204, 121, 167]).max(axis=2) < 12).sum()
         assert (purple > 50) == seen

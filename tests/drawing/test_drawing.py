@@ -11,6 +11,7 @@ from conftest import quickest
 from PIL import Image
 
 from pushplan.drawing import draw_world, save_animation, save_image
+from pushplan.drawing.top_view import film_view
 from pushplan.world import (
     ClearanceArea,
     Drive,
@@ -155,12 +156,50 @@ def test_long_maps_keep_their_shape_with_even_sides() -> None:
     assert (height, width) == (SIZE, SIZE // 4)
 
 
-def test_long_maps_are_shown_around_the_robot() -> None:
+SIDES = [(9.0, 2.0), (2.0, 9.0), (100.0, 2.0), (2.0, 100.0), (0.4, 0.1), (1000.0, 800.0)]
+
+
+def hall(width: float, height: float) -> tuple[World, Plan]:
+    """An empty hall whose robot goes from one end to the other."""
+    size = 0.1 * min(width, height, 2.0)
+    ends = np.array([[0.05, 0.05], [0.95, 0.95]]) * [width, height]
+    robot = RobotModel.from_outline(
+        SQUARE * size, mass=1.0, drive=Drive.DIFFERENTIAL, max_speed=1.0, max_turn_rate=1.0
+    )
+    floor = StaticMap.build(bounds=[0, 0, width, height])
+    world = World(robot, [*ends[0], 0.0], floor, Movables.empty(), GoalDisc(ends[1], size))
+    poses = np.column_stack([np.linspace(*ends, 9), np.zeros(9)])
+    return world, Plan(np.arange(9.0), poses, np.zeros(9), np.zeros(9), 1.0)
+
+
+@pytest.mark.parametrize(("width", "height"), SIDES)
+def test_a_still_shows_all_of_the_world_whatever_its_shape(width: float, height: float) -> None:
+    world, plan = hall(width, height)
+    picture = draw_world(world, size_px=SIZE, plan=plan).astype(int)
+    rows, columns = picture.shape[:2]
+    assert rows / columns == pytest.approx(height / width, rel=0.2)
+    red, green, blue = np.moveaxis(picture, -1, 0)
+
+    def along(seen: np.ndarray) -> np.ndarray:
+        """Part of the way from one end of the hall to the other at which pixels lie."""
+        up, right = np.nonzero(seen[::-1])
+        return up / rows if rows > columns else right / columns
+
+    assert np.median(along(blue > red + 60)) == pytest.approx(0.05, abs=0.05)  # robot
+    assert np.median(along((green > red + 15) & (green > blue + 5))) == pytest.approx(
+        0.95, abs=0.05
+    )
+    plan = along(red > blue + 60)
+    assert plan.min() < 0.2 and plan.max() > 0.8
+
+
+def test_long_maps_are_shown_around_the_robot_where_the_picture_follows() -> None:
     world = scene(height=400.0)
+    assert film_view(scene()) is None and film_view(scene(height=24.0)) is None
     shapes = set()
     for y in (2.0, 50.0, 321.4, 399.0):
         there = world.moved(robot_pose=[5.0, y, 0.3])
-        picture = draw_world(there, size_px=SIZE)
+        picture = draw_world(there, size_px=SIZE, view=film_view(there))
         shapes.add(picture.shape)
         rows, _ = np.nonzero(picture[..., 2].astype(int) - picture[..., 0] > 90)  # the robot's blue
         middle = picture.shape[0] / 2
@@ -184,7 +223,7 @@ def test_still_things_do_not_shimmer_while_the_picture_follows() -> None:
         GoalDisc(np.array([9.0, 399.0]), 0.5),
     )
     pictures = [
-        draw_world(world.moved(robot_pose=[8.0, 100.0 + dy, 0.0]), size_px=SIZE)[:, :120]
+        draw_world(world.moved(robot_pose=[8.0, 100.0 + dy, 0.0]), size_px=SIZE, view=16.0)[:, :120]
         for dy in (0.0, 0.0131, 0.0263)
     ]
     for picture in pictures[1:]:

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_drawing import SIZE, SQUARE, plan_of, scene
+from test_drawing import SIDES, SIZE, SQUARE, hall, plan_of, scene
 
 from pushplan.drawing import Panel, add_strips, draw_figure, draw_world, legend_of, save_figure
+from pushplan.drawing.figure import COLUMN
 from pushplan.world import InvalidInputError, Movables, World
 
 PATH = np.array([[1.0, 1.0], [2.0, 1.5], [3.0, 3.0]])
@@ -43,6 +44,19 @@ def test_axes_are_in_metres_and_nothing_lies_over_them() -> None:
         box = axes.get_tightbbox()
         assert box.y0 > legend.y1 and box.y1 <= page.y1 and box.x0 >= 0.0
         assert axes.get_aspect() == 1.0
+
+
+@pytest.mark.parametrize(("width", "height"), SIDES)
+def test_a_figure_holds_all_of_a_world_on_one_page(width: float, height: float) -> None:
+    world, plan = hall(width, height)
+    figure = draw_figure(Panel(world, plan=plan, title="plan"))
+    figure.draw_without_rendering()
+    (axes,) = figure.axes
+    assert (axes.get_xlim(), axes.get_ylim()) == ((0.0, width), (0.0, height))
+    page, box = figure.bbox, axes.get_tightbbox()
+    assert figure.legends[0].get_window_extent().y1 < box.y0
+    assert page.x0 <= box.x0 and box.x1 <= page.x1 and box.y1 <= page.y1
+    assert figure.get_figwidth() <= COLUMN and figure.get_figheight() < 2.0 * COLUMN
 
 
 def test_files_repeat_and_letters_stay_letters(tmp_path: Path) -> None:

@@ -1,8 +1,5 @@
 """What a user can get wrong at the doors of an environment, and odd requests that have to work."""
 
-import copy
-import pickle
-
 import numpy as np
 import pytest
 
@@ -90,16 +87,3 @@ def test_a_speck_of_ice_does_not_stop_the_clock(tmp_path):
     env.reset(seed=0)
     for _ in range(5):
         assert np.isfinite(env.step([0.0])[1])
-
-
-@pytest.mark.parametrize("clone", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
-def test_a_copy_in_the_middle_of_an_episode_goes_on_alike(clone):
-    env = PushEnv(task="box_delivery", variations={"wheeled": 0.5}, action="velocity")
-    env.reset(seed=4)
-    for _ in range(30):
-        env.step([1.0, 0.1])
-    other = clone(env)
-    for _ in range(20):
-        one, two = env.step([1.0, -0.2]), other.step([1.0, -0.2])
-        assert (one[0] == two[0]).all() and one[1:4] == two[1:4]
-    assert env.world == other.world

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import itertools
+import re
 import warnings
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -13,6 +15,7 @@ from matplotlib.collections import PathCollection
 from matplotlib.text import Text
 from synthetic_rows import many_rows
 
+from pushplan.drawing import save_figure
 from pushplan.evaluation import Results
 from pushplan.evaluation.report.plots import FIGURES
 
@@ -103,3 +106,23 @@ def test_no_text_overlaps_and_nothing_is_cut_off(
             for mean in means:  # nor is one outside of its axes
                 (x,), (y,) = mean.get_xdata(), mean.get_ydata()
                 assert axes.viewLim.padded(1e-9).contains(x, y)
+
+
+@pytest.mark.parametrize("name", FIGURES)
+@pytest.mark.parametrize(("policies", "settings"), [(2, 3), (3, 1)])
+def test_a_pdf_is_no_wider_than_an_article_and_every_axis_has_a_scale(
+    name: str, policies: int, settings: int, tmp_path: Path
+) -> None:
+    figure = study(policies, settings, False).figure(name)
+    save_figure(tmp_path / "a.pdf", figure)
+    box = re.search(rb"/MediaBox \[ 0 0 ([0-9.]+) ", (tmp_path / "a.pdf").read_bytes())
+    assert box is not None and float(box[1]) / 72.0 * 72.27 <= 345.0
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    shown_texts(figure, canvas.get_renderer())
+    for axes in filter(
+        lambda axes: axes.get_visible() and axes.xaxis.get_ticklabels(), figure.axes
+    ):
+        ticks = [tick.label1 for tick in axes.xaxis.get_major_ticks()]
+        numbers = {label.get_text() for label in ticks if label.get_visible()} - {""}
+        assert len(numbers) >= 3, (axes.get_xlabel(), axes.viewLim)

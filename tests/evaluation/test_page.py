@@ -144,13 +144,46 @@ def test_an_episode_is_played_beside_another_in_step(opened: Opened, folder: Pat
     assert opened.state("player.playing") is False
 
 
+def test_the_highlighted_cell_stays_that_of_the_replay(opened: Opened) -> None:
+    page = opened.page
+    page.locator("#measure").select_option("I_nav")
+    page.locator(f"{LINES} td:nth-child(3)").nth(1).click()
+    page.wait_for_function("player.views.length === 2")
+    line = (
+        "({ key: player.one.key, policy: player.views[0].policy, job: player.views[0].replay.job })"
+    )
+    replayed = opened.state(line)
+
+    def highlighted() -> list[tuple[str, int]]:
+        cells = page.locator("#matrix td.chosen").all()
+        key = "e => [e.parentNode.firstChild.innerText, e.cellIndex - 1]"
+        return [tuple(cell.evaluate(key)) for cell in cells]
+
+    order = [opened.cells(1)]
+    for heading in ("scenario", "straight", "random", "random", "scenario"):
+        page.locator("#matrix th button", has_text=heading).click()
+        assert highlighted() == [(replayed["key"], replayed["policy"])]
+        assert opened.state("state.chosen") == replayed["job"]
+        order.append(opened.cells(1))
+    assert len({*map(tuple, order)}) > 1
+    other = next(key for key in order[0] if key != replayed["key"])
+    page.locator("#find").fill(other)
+    assert highlighted() == []  # it is not among those that are shown
+    page.locator("#find").fill("")
+    page.locator("#matrix").focus()
+    page.keyboard.press("ArrowDown")  # moves the cursor, not the replay
+    assert highlighted() == [(replayed["key"], replayed["policy"])]
+    assert opened.state(line) == replayed
+
+
 @pytest.mark.slow
 def test_keys_move_in_the_matrix_and_choose(opened: Opened) -> None:
-    assert opened.state("[state.line, state.column]") == [0, 1]  # who has no success comes first
+    at = "[state.shown.indexOf(state.one), state.column]"
+    assert opened.state(at) == [0, 1]  # who has no success comes first
     opened.page.locator("#matrix").focus()
     for key in ("ArrowDown", "ArrowDown", "ArrowUp", "ArrowRight", "ArrowLeft", "Enter"):
         opened.page.keyboard.press(key)
-    assert opened.state("[state.line, state.column]") == [1, 1]
+    assert opened.state(at) == [1, 1]
     assert "random" in opened.page.locator("#chosen").inner_text()
     opened.page.locator("h1").click()
     ground = "getComputedStyle(document.body).backgroundColor"

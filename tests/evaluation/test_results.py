@@ -225,7 +225,7 @@ def test_report_files(results: Results, monkeypatch: pytest.MonkeyPatch) -> None
 
 def test_intervals_are_drawn_as_the_tables_have_them(results: Results) -> None:
     figure = results.figure("intervals")
-    assert figure.get_figwidth() == pytest.approx(3.4)  # a column
+    assert figure.get_figwidth() == pytest.approx(4.75)  # the text of an article
     panels = {axes.get_xlabel(): axes for axes in figure.axes}
     for name, axes in panels.items():
         for summary, bar in zip(results.summary(), axes.containers, strict=True):

@@ -177,6 +177,7 @@ void PlanarSimulator::simulate(Index samples, Run run) {
     driven_.resize(static_cast<std::size_t>(samples * bodies));
     driven = {driven_.data(), {samples, bodies}};
     run();
+    most_shapes = std::max(most_shapes, scene_.shape_count());
     for (Index t = 0; t < samples; ++t) {
       std::ranges::copy(poses_, paths.row(t).begin());
       for (Index i = 1; i < bodies; ++i) {

@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -88,8 +88,25 @@ class Simulator(ABC):
     is_exact: ClassVar[bool] = False
     """True if the robot follows a command exactly unless something blocks it."""
 
+    engine_parts: ClassVar[tuple[str, ...]] = ()
+    """Attributes that `build` makes from a world, which a copy makes anew and never shares."""
     _world: World
+    _materials: Materials
     _held = _touched = False
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but the engine's own objects, and the state they are in (`save`)."""
+        kept = {key: self.__dict__[key] for key in self.__dict__ if key not in self.engine_parts}
+        built = bool(self.engine_parts) and hasattr(self, "_world")
+        return {**kept, "saved": self.save() if built else None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        saved = state.pop("saved", None)
+        self.__dict__.update(state)
+        if saved is not None:
+            self.build(self._world, self._materials)
+            self.restore(saved)
+            self.__dict__.update(state)
 
     @abstractmethod
     def build(self, world: World, materials: Materials) -> None:

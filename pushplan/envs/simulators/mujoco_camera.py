@@ -19,8 +19,6 @@ from pushplan.world.checks import FloatArray, integer
 
 _ELEVATION = -58.0
 _FIELD_OF_VIEW = 40.0
-_LONGEST = 2.0  # depth over width of what is shown
-_BEHIND = 0.2  # fraction of that which lies behind the robot
 _MOST_GEOMS = 20_000
 
 
@@ -79,18 +77,10 @@ class MujocoCamera:
         return np.ascontiguousarray(picture[::-1])
 
     def _aim(self, world: World) -> None:
-        """Far enough away for the bounds to fit into the picture both ways.
-
-        Of bounds that are much longer than wide, only a stretch that begins at the robot is shown.
-        """
-        low = world.static.bounds[:2].copy()
-        high = world.static.bounds[2:].copy()
+        """Far enough away for the bounds to fit into the picture both ways."""
+        low = world.static.bounds[:2]
+        high = world.static.bounds[2:]
         width, depth = (float(side) for side in high - low)
-        if depth > _LONGEST * width:
-            depth = _LONGEST * width
-            y = float(world.robot_pose[1]) - _BEHIND * depth
-            low[1] = min(max(y, float(low[1])), float(high[1]) - depth)
-            high[1] = low[1] + depth
         aspect = self.size[0] / self.size[1]
         half_view = math.tan(math.radians(0.5 * _FIELD_OF_VIEW))
         tilt = math.radians(-_ELEVATION)
@@ -108,7 +98,8 @@ class MujocoCamera:
         bounds = world.static.bounds
         thin = 1e-3 * float((bounds[2:] - bounds[:2]).max())
         if isinstance(goal, GoalDisc):
-            self._mark_disc(goal.center, goal.radius, thin)
+            size = np.array([goal.radius, thin, 0.0])
+            self._mark(mujoco.mjtGeom.mjGEOM_CYLINDER, FLOOR_PALETTE.goal[0], size, goal.center)
             return
         if isinstance(goal, GoalLine):
             along = np.array([-goal.normal[1], goal.normal[0]])
@@ -124,37 +115,23 @@ class MujocoCamera:
             ]
             if isinstance(goal, ClearanceArea):
                 edges = [e for e, is_open in zip(edges, goal.open_edges, strict=True) if is_open]
-        for a, b in edges:
-            self._mark_edge(a, b, thin)
+        kind = mujoco.mjtGeom.mjGEOM_CAPSULE
+        for ends in edges:
+            geom = self._mark(kind, FLOOR_PALETTE.goal[1], np.zeros(3), np.zeros(2))
+            if geom is not None:
+                mujoco.mjv_connector(geom, kind.value, 3.0 * thin, *np.pad(ends, ((0, 0), (0, 1))))
 
-    def _mark_disc(self, center: FloatArray, radius: float, thin: float) -> None:
-        kind = mujoco.mjtGeom.mjGEOM_CYLINDER
-        color = FLOOR_PALETTE.goal[0]
-        self._mark(kind, [radius, thin, 0.0], [*center, 0.0], np.eye(3), color)
-
-    def _mark_edge(self, a: FloatArray, b: FloatArray, thin: float) -> None:
-        along = b - a
-        length = float(np.hypot(*along))
-        c, s = along / length
-        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        size = [0.5 * length, 4.0 * thin, 2.0 * thin]
-        middle = [*(0.5 * (a + b)), 0.0]
-        self._mark(mujoco.mjtGeom.mjGEOM_BOX, size, middle, turn, FLOOR_PALETTE.goal[1])
-
-    def _mark(self, kind: Any, size: Any, pos: Any, turn: Any, color: str) -> None:
+    def _mark(self, kind: Any, color: str, size: FloatArray, place: FloatArray) -> Any:
+        """A further shape in the scene, at a place (2,) on the ground; None if it is full."""
         scene = self._scene
         if scene.ngeom >= scene.maxgeom:
-            return
+            return None
         geom = scene.geoms[scene.ngeom]
-        mujoco.mjv_initGeom(
-            geom,
-            kind.value,
-            np.array(size, dtype=np.float64),
-            np.array(pos, dtype=np.float64),
-            np.asarray(turn, dtype=np.float64).ravel(),
-            np.array(rgba(color), dtype=np.float32),
-        )
+        turn = np.eye(3).ravel()
+        paint = np.array(rgba(color), dtype=np.float32)
+        mujoco.mjv_initGeom(geom, kind.value, size, np.append(place, 0.0), turn, paint)
         scene.ngeom += 1
+        return geom
 
 
 def _open(model: Any, width: int, height: int) -> tuple[Any, Any]:

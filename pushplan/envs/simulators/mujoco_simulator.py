@@ -41,11 +41,12 @@ class MujocoSimulator(Simulator):
     name = "mujoco"
     needs_solids = True
     has_camera = True
+    engine_parts = ("_bodies", "_camera")
+    _bodies: MujocoBodies | None = None
+    _camera: MujocoCamera | None = None
 
     def __init__(self, options: MujocoOptions | None = None) -> None:
         self.options = options or MujocoOptions()
-        self._bodies: MujocoBodies | None = None
-        self._camera: MujocoCamera | None = None
 
     def build(self, world: World, materials: Materials) -> None:
         """Replace the scene with this one; a scene of the same shapes keeps its model.

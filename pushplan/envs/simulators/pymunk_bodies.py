@@ -88,12 +88,36 @@ class PymunkBodies:
 
         self.functions = [address(ffi.addressof(self._lib, name)) for name in _FUNCTIONS]
         robot = (self._robot._body, [part._shape for part in self._robot_shapes])
-        bodies = [robot, *self._objects]
+        self._moving = bodies = [robot, *self._objects]
         self.handles = (
             address(self.space._space),
             [address(body) for body, _ in bodies],
             [[address(shape) for shape in shapes] for _, shapes in bodies],
         )
+
+    @property
+    def shapes_so_far(self) -> int:
+        """Number of times that a shape came into the space."""
+        return int(self._lib.cpSpaceGetShapeIDCounter(self.space._space))
+
+    def go_on_from(self, came: int, most: int) -> None:
+        """Solve contacts in the order of a space into which so many shapes came, ``most`` at once.
+
+        The engine numbers shapes as they come, and lists them by number in a table that grows.
+        """
+        lib = self._lib
+        space = self.space._space
+        bodies = [body for body, _ in self._moving]
+        shapes = [shape for _, own in self._moving for shape in own][:most]
+        for change, changed in (
+            (lib.cpSpaceAddBody, bodies),
+            (lib.cpSpaceAddShape, shapes),
+            (lib.cpSpaceRemoveShape, shapes),
+            (lib.cpSpaceRemoveBody, bodies),
+        ):
+            for one in changed:
+                change(space, one)
+        lib.cpSpaceSetShapeIDCounter(space, came)
 
     def watch(self, record: int) -> None:
         """Let the engine report contacts of moving and static shapes to a record of the core."""

@@ -42,6 +42,7 @@ class PymunkSimulator(Simulator):
 
     name = "pymunk"
     is_exact = True
+    engine_parts = ("_bodies", "_core", "_rows")
 
     def __init__(self, options: PymunkOptions | None = None) -> None:
         self.options = options or PymunkOptions()
@@ -58,25 +59,19 @@ class PymunkSimulator(Simulator):
         self._world = world
         self._time = world.time
         assert world.robot_twist is not None
-        robot_row = np.concatenate([world.robot_pose, world.robot_twist])
-        objects = np.concatenate([world.movables.poses, world.movables.twists], axis=1)
+        movables = world.movables
+        poses = np.vstack([world.robot_pose, movables.poses])
         # (1 + K, 6) poses and twists, which the core changes
-        self._rows = np.concatenate([robot_row[None], objects])
+        self._rows = np.hstack([poses, np.vstack([world.robot_twist, movables.twists])])
         self._held = self._touched = False
-        self._connect()
-
-    def _connect(self) -> None:
-        """Make the objects of the engine and of the core, which the rest decides."""
         options = self.options
-        robot = self._world.robot
-        movables = self._world.movables
         bodies = PymunkBodies(
-            self._world,
-            self._materials,
+            world,
+            materials,
             slop=options.slop * self._size,
             iterations=options.iterations,
         )
-        momentum = Momentum.of(self._world, self._materials)
+        momentum = Momentum.of(world, materials)
         self._core = core.PlanarSimulator(
             bodies.functions,
             *bodies.handles,
@@ -84,7 +79,7 @@ class PymunkSimulator(Simulator):
             reach=core.Reach(
                 robot.vertices, robot.offsets, movables.vertices, movables.offsets, movables.radii
             ),
-            obstacles=obstacles_of(self._world.static),
+            obstacles=obstacles_of(world.static),
             keeps=momentum.keeps,
             inertia=momentum.inertia,
             drag=momentum.drag,
@@ -97,15 +92,20 @@ class PymunkSimulator(Simulator):
             holds=options.holds_direction,
         )
         bodies.watch(self._core.contacts)
+        self._bodies = bodies
 
     def __getstate__(self) -> dict[str, Any]:
-        """Everything but what `_connect` makes."""
-        return {key: value for key, value in self.__dict__.items() if key != "_core"}
+        state = super().__getstate__()
+        if "_core" in self.__dict__:
+            state["history"] = self._bodies.shapes_so_far, self._core.most_shapes
+        return state
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        if "_world" in state:
-            self._connect()
+        came, most = state.pop("history", (0, 0))
+        super().__setstate__(state)
+        if most:
+            self._bodies.go_on_from(came, most)
+            self._core.most_shapes = most
 
     def step(self, command: Twist, duration: float) -> Trace:
         """Drive at a body-frame velocity for ``duration`` [s]."""
@@ -155,11 +155,10 @@ class PymunkSimulator(Simulator):
 
     def restore(self, state: SimulatorState) -> None:
         """Go back to a saved state of the same scene."""
-        robot = np.concatenate([state.robot_pose, state.robot_twist])
-        objects = np.concatenate([state.object_poses, state.object_twists], axis=1)
         self._time = state.time
         self._held = self._touched = False
-        self._rows[:] = np.concatenate([robot[None], objects])
+        self._rows[:, :3] = np.vstack([state.robot_pose, state.object_poses])
+        self._rows[:, 3:] = np.vstack([state.robot_twist, state.object_twists])
 
     def remove(self, object_ids: Sequence[int]) -> None:
         """Take objects off the floor."""

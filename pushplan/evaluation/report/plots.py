@@ -13,7 +13,7 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
-from pushplan.drawing.figure import COLUMN, STYLE, save_figure
+from pushplan.drawing.figure import COLUMN, STYLE, TEXT, save_figure
 from pushplan.evaluation.report.plot_style import (
     LINE,
     add_legend,
@@ -106,7 +106,7 @@ def _tradeoff(run: StoredRun) -> Figure | None:
         )
         unclipped(points, bar.lines[0])
         axes.margins(0.08)
-        axes.locator_params(nbins=4)
+        axes.locator_params(nbins=4, min_n_ticks=3)
 
     labels = ("effort I (1 = pushed nothing)", "efficiency E (1 = shortest path)")
     figure = _panels(run, ("I_nav", "I_manip"), cloud, labels)
@@ -141,7 +141,7 @@ def _spread(run: StoredRun) -> Figure | None:
     for setting, names in columns.items():
         lines = sum(wrapped(label).count("\n") + 1.3 for label in run.policies_in(setting))
         heights.append(math.ceil(len(names) / 2) * (LINE * lines + 0.5) + 0.4)
-    figure = Figure(figsize=(2.0 * PANEL[0], sum(heights)), layout="constrained")
+    figure = Figure(figsize=(TEXT, sum(heights)), layout="constrained")
     parts = figure.subfigures(len(columns), 1, squeeze=False, height_ratios=heights)[:, 0]
     rng = np.random.default_rng(0)
     for part, (setting, names) in zip(parts, columns.items(), strict=True):
@@ -190,7 +190,7 @@ def _boxes(
         unclipped(_cloud(axes, values, places, place, s=6, alpha=0.55, zorder=3))
     axes.set_yticks(range(len(policies)), list(map(wrapped, policies)), fontsize=7.0)
     axes.set_ylim(len(policies) - 0.4, -0.6)
-    axes.locator_params(axis="x", nbins=3)
+    axes.locator_params(axis="x", nbins=3, min_n_ticks=3)
     tidy(axes)
 
 
@@ -215,7 +215,7 @@ def _profiles(run: StoredRun) -> Figure | None:
             axes.fill_between(thresholds, found.low, found.high, **band)
         axes.set_xlabel(f"{heading(name)} above")
         axes.set_ylim(0.0, 1.02)
-        axes.locator_params(axis="x", nbins=3)
+        axes.locator_params(axis="x", nbins=3, min_n_ticks=3)
 
     return _sheet(kinds, panel, "fraction of episodes", sharex=False)
 
@@ -289,7 +289,7 @@ def _sheet(
 ) -> Figure:
     """A panel for each name, two beside each other, with one label on the left and a legend."""
     columns = min(2, len(names))
-    size = (PANEL[0] * columns, PANEL[1] * math.ceil(len(names) / columns))
+    size = (min(PANEL[0] * columns, TEXT), PANEL[1] * math.ceil(len(names) / columns))
     figure = Figure(figsize=size, layout="constrained")
     for axes, name in zip(_grid(figure, len(names), sharex=sharex), names, strict=False):
         panel(axes, name)
@@ -309,7 +309,7 @@ def _intervals(run: StoredRun) -> Figure:
         if any(name in summary.metrics for summary in run.summary()):
             columns.setdefault(name[0], []).append(name)
     found = {(one.setting, one.policy): one for one in run.summary()}
-    figure = Figure(figsize=(COLUMN, 1.0), layout="constrained")
+    figure = Figure(figsize=(TEXT, 1.0), layout="constrained")
     panels = figure.subplots(1, 1 + len(columns), squeeze=False, sharey=True)[0]
     ticks: dict[float, str] = {}
     below = 0.0  # lines of text
@@ -331,7 +331,7 @@ def _intervals(run: StoredRun) -> Figure:
     figure.set_figheight(LINE * below + 0.5)
     for axes, names in zip(panels, [["success"], *columns.values()], strict=True):
         axes.set_xlabel(names[0] if len(names) == 1 else names[0][0])
-        axes.locator_params(axis="x", nbins=1, min_n_ticks=1)
+        axes.locator_params(axis="x", nbins=3, min_n_ticks=3)
         axes.xaxis.set_major_formatter("{x:g}")
         axes.margins(x=0.08)
         tidy(axes)

@@ -99,7 +99,6 @@ class GtspMpc(RearrangementPolicy):
         self._choosing: PendingChoice | None = None
         self._execution: PushExecution | None = None
         self._shown: Push | None = None
-        self._searched: PushScene | None = None
         self._unfinished: _Unfinished | None = None
         self._cache = RolloutCache()
         self._history = PushHistory()
@@ -194,9 +193,9 @@ class GtspMpc(RearrangementPolicy):
             False if there is nothing to do, or the choice is not there yet.
         """
         if self._choosing is None:
-            if self._searched is scene:  # one search a step is enough
+            if "searched" in scene.progress:  # one search a step is enough
                 return False
-            self._searched = scene
+            scene.progress["searched"] = True
             searched = scene
             unfinished = self._unfinished
             if unfinished is not None:
@@ -325,9 +324,7 @@ class GtspMpc(RearrangementPolicy):
         if choice.recovery is not None and moved:
             self._recovered_from = here
             follower = PoseFollower(scene.world.robot, choice.recovery, self.config.response)
-            self._recovery = lambda world, held: follower.command(
-                world.robot_pose, world.time, held
-            )
+            self._recovery = follower.drive
             self._unfinished = None
             self._cache = RolloutCache()  # that nothing was found is no longer true out there
             return True

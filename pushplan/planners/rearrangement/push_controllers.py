@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -131,9 +132,9 @@ def make_pusher(scene: PushScene, push: Push, held: float, predictive: bool) -> 
     world = scene.world
     if push.controller == "arc":
         follower = PoseFollower(world.robot, push.poses, config.response)
-        return lambda now, held: follower.command(now.world.robot_pose, now.world.time, held)
+        return partial(_along_poses, follower)
     if push.controller == "line":
-        return lambda now, _: _along_line(now, push.start)
+        return partial(_along_line, push.start)
     away = initial_heading(push.object_path, scene.controller.ahead) - float(world.robot_pose[2])
     straight = abs(math.remainder(away, math.tau)) < _MPC_HEADING
     # the contact model of `PushingMpc` is that of one object, along its path
@@ -148,7 +149,11 @@ def make_pusher(scene: PushScene, push: Push, held: float, predictive: bool) -> 
     return PathPush(world.robot, push.target, path, pusher).command
 
 
-def _along_line(scene: PushScene, start: FloatArray) -> Twist:
+def _along_poses(follower: PoseFollower, scene: PushScene, held: float) -> Twist | None:
+    return follower.drive(scene.world, held)
+
+
+def _along_line(start: FloatArray, scene: PushScene, _: float) -> Twist:
     """The velocity that keeps the robot on the line of a push that began at a pose (3,)."""
     pose = scene.world.robot_pose
     error = math.remainder(float(start[2] - pose[2]), math.tau)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import copy
 import math
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -30,7 +29,7 @@ from pushplan.planners.rearrangement.push_starts import PushStarts
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.planners.rearrangement.search_budget import SearchBudget
-from pushplan.world import Movables, World
+from pushplan.world import Movables, PushplanError, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 T = TypeVar("T")
@@ -99,10 +98,20 @@ class PushScene:
 
     def _changed(self, **values: Any) -> PushScene:
         """The same with other fields, or with other values of what is worked out from them."""
-        other = copy.copy(self)
+        other = object.__new__(PushScene)
+        other.__dict__.update({**self.__dict__, **values})
         other.__dict__.pop("progress", None)
-        other.__dict__.update(values)
         return other
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out what a copy works out by itself."""
+        if self.budget.interrupted:
+            raise PushplanError(
+                "a policy cannot be copied while it searches for its next push: copy it when it "
+                "has begun that push, or before reset()"
+            )
+        given = {one.name: getattr(self, one.name) for one in fields(self)}
+        return {**given, "budget": SearchBudget(), "poses": self.poses}
 
     @cached_property
     def progress(self) -> dict[Hashable, Any]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pushplan
-from pushplan.drawing.figure import COLUMN, DPI, STYLE
+from pushplan.drawing.figure import DPI, STYLE, TEXT
 from pushplan.imports.on_demand import need
 from pushplan.learned.sb3_saving import attach
 from pushplan.training.libraries import chosen_device, hardware, parameter_count
@@ -136,7 +136,7 @@ def _draw(run: TrainingRun) -> None:
     if not points:
         return
     with rc_context(STYLE):
-        figure: Any = Figure(figsize=(2.0 * COLUMN, 2.6), layout="constrained")
+        figure: Any = Figure(figsize=(TEXT, 2.6), layout="constrained")
         returns, fractions = figure.subplots(1, 2)
         returns.set_ylabel("reward of an episode")
         steps = [point.steps for point in points]

@@ -116,6 +116,9 @@ class ChipmunkScene {
   /// Removes from states (1 + A,) the velocities that bodies do not keep for `h` [s] untouched.
   void slow(std::span<BodyState> states, double h) const;
 
+  /// Number of shapes that are loaded.
+  std::size_t shape_count() const { return shapes_.size(); }
+
   /// The record; its address is for the engine's callbacks.
   StaticContacts& contacts() { return contacts_; }
 

@@ -57,6 +57,8 @@ class PlanarSimulator {
 
   /// True if objects that cannot move are simulated as well: a reference for tests.
   bool loads_all = false;
+  /// Greatest number of shapes that were in the engine at once.
+  std::size_t most_shapes = 0;
 
  private:
   template <class Run>

@@ -58,7 +58,7 @@ const MARKS = ["", " ✗", " ⚠"];
 const CLASSES = ["", "missed", "failed"];
 
 // ---- the matrix: only the rows in sight are in the document
-const state = { shown: [], sort: null, down: true, line: 0, column: 0 };
+const state = { shown: [], sort: null, down: true, one: null, column: 0, chosen: "" }; // cursor, and job that is shown
 for (const title of data.settings) $("setting").append(make("option", title));
 for (const [name, heading] of data.measures) $("measure").append(make("option", heading, { value: name }));
 const matrix = $("matrix");
@@ -113,7 +113,6 @@ function filter() {
     });
     mark([...head.cells], sort + 1, down);
   }
-  state.line = Math.min(state.line, Math.max(0, state.shown.length - 1));
   $("count").textContent = `${state.shown.length} of ${scenarios.length} scenarios`;
   draw();
 }
@@ -130,11 +129,11 @@ function draw() {
   };
   const lines = [];
   if (first > 0) lines.push(space(first));
-  for (let i = first; i < last; i++) lines.push(line(state.shown[i], i));
+  for (let i = first; i < last; i++) lines.push(line(state.shown[i]));
   if (last < state.shown.length) lines.push(space(state.shown.length - last));
   body.replaceChildren(...lines);
 }
-function line(one, index) {
+function line(one) {
   const found = make("tr");
   found.append(make("td", one.key, { title: `${data.settings[one.setting]}, seed ${one.seed}` }));
   one.rows.forEach((row, policy) => {
@@ -144,17 +143,19 @@ function line(one, index) {
       cell.textContent = (value === null ? "–" : typeof value === "number" ? Number(value.toPrecision(4)) : value) + MARKS[rank(row)];
       cell.className = CLASSES[rank(row)];
       cell.title = data.reasons[data.rows.reason[row]];
-      cell.onclick = () => { [state.line, state.column] = [index, policy]; draw(); choose(one, policy); };
+      cell.onclick = () => choose(one, policy);
+      cell.classList.toggle("chosen", data.rows.job[row] === state.chosen);
     }
-    if (index === state.line && policy === state.column) cell.classList.add("at");
+    cell.classList.toggle("at", one === state.one && policy === state.column);
     found.append(cell);
   });
   return found;
 }
 function move(lines, columns) {
-  state.line = Math.min(Math.max(state.line + lines, 0), state.shown.length - 1);
+  const at = Math.min(Math.max(state.shown.indexOf(state.one) + lines, 0), state.shown.length - 1);
+  state.one = state.shown[at];
   state.column = Math.min(Math.max(state.column + columns, 0), data.policies.length - 1);
-  const top = state.line * ROW;
+  const top = at * ROW;
   if (top < matrix.scrollTop) matrix.scrollTop = top;
   if (top + 2 * ROW > matrix.scrollTop + matrix.clientHeight - ROW) matrix.scrollTop = top + 3 * ROW - matrix.clientHeight;
   draw();
@@ -167,6 +168,8 @@ function choose(one, policy) {
   const row = one.rows[policy];
   if (row < 0) return null;
   const rows = data.rows;
+  Object.assign(state, { one, column: policy, chosen: rows.job[row] });
+  draw();
   const list = make("dl");
   const say = (name, ...parts) => { const dd = make("dd"); dd.append(...parts); list.append(make("dt", name), dd); };
   say("policy", data.policies[policy]);
@@ -186,12 +189,10 @@ function choose(one, policy) {
 }
 
 function chooseFirst() { // of the first scenario with a replay in the page the worst episode, as it ended
-  for (const [line, one] of state.shown.entries()) {
+  for (const one of state.shown) {
     const worth = one.rows.map((row) => (row >= 0 && data.rows.replay[row] === 1 ? rank(row) : -1));
     const column = worth.indexOf(Math.max(...worth));
     if (worth[column] < 0) continue;
-    Object.assign(state, { line, column });
-    draw();
     choose(one, column).then(() => seek(player.end));
     return;
   }
@@ -209,7 +210,7 @@ document.addEventListener("keydown", (event) => {
     ArrowUp: inMatrix && (() => move(-1, 0)), ArrowDown: inMatrix && (() => move(1, 0)),
     ArrowLeft: inMatrix && (() => move(0, -1)), ArrowRight: inMatrix && (() => move(0, 1)),
     PageUp: inMatrix && (() => move(-10, 0)), PageDown: inMatrix && (() => move(10, 0)),
-    Enter: inMatrix && (() => state.shown[state.line] && choose(state.shown[state.line], state.column)),
+    Enter: inMatrix && (() => state.shown.includes(state.one) && choose(state.one, state.column)),
   };
   if (keys[event.key]) { event.preventDefault(); keys[event.key](); }
 });

@@ -54,6 +54,7 @@ async function showReplays(one, policy) {
 }
 async function setViews(policy) {
   const shown = [policy, ...($("beside").value === "" ? [] : [Number($("beside").value)])];
+  const { chosen } = state;
   const jobs = shown.map((p) => player.one.rows[p]);
   const found = await Promise.all(jobs.map((row) => loaded(data.rows.job[row], data.rows.replay[row])));
   const views = [];
@@ -66,6 +67,7 @@ async function setViews(policy) {
     box.append(caption, canvas);
     views.push({ canvas, box, replay: await unpacked(replay), policy: shown[i] });
   }
+  if (chosen !== state.chosen) return; // another one was chosen meanwhile
   player.views = views;
   player.end = Math.max(...views.map((view) => view.replay.times.at(-1)));
   $("views").replaceChildren(...views.map((view) => view.box));

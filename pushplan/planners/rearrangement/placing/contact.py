@@ -11,11 +11,10 @@ from functools import cached_property
 import numpy as np
 from shapely import Polygon
 
-from pushplan.core import motion as core
 from pushplan.geometry import gyration_squares
 from pushplan.planners.pushing import Bumper, PushModel, PushParameters, faces_of
 from pushplan.world import Movables, RobotModel
-from pushplan.world.checks import FloatArray
+from pushplan.world.checks import FloatArray, IntArray
 from pushplan.world.outline import convex_outline, flatten, transform
 
 _FRACTION = 0.7  # of the stable curvature that is used
@@ -23,6 +22,9 @@ _LEAST_FACE = 0.2  # shortest face that is pushed [half widths of the bumper]
 MARGIN = 0.07  # that robot and object keep from other objects [circumscribed radii]
 _BESIDE = 0.8  # offset of a contact beside the middle, of what keeps the face on the bumper
 _STRAIGHT = 1e-3  # curvature below which a face does not hold [1/circumscribed radii]
+
+Body = tuple[FloatArray, IntArray, float]
+"""Corners (V, 2), the first of each convex part, and the circumscribed radius [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,15 +38,15 @@ class Contact:
         model: of the push.
         radius: least turning radius of the two [m].
         object_pose: (3,) of the object in the robot's frame.
-        body: robot and object, in the robot's frame.
+        body: robot and object, in the robot's frame; arguments of `core.Footprint`.
         wide: the same, grown by what they keep from other objects.
     """
 
     model: PushModel
     radius: float
     object_pose: FloatArray
-    body: core.Footprint
-    wide: core.Footprint
+    body: Body
+    wide: Body
 
     @cached_property
     def _robot_pose(self) -> FloatArray:
@@ -110,12 +112,12 @@ def _contacts(
     return tuple(found)
 
 
-def body_of(parts: Sequence[FloatArray], margin: float) -> core.Footprint:
+def body_of(parts: Sequence[FloatArray], margin: float) -> Body:
     """Convex parts (N, 2) in one frame, grown by a margin [m]."""
     rings = [Polygon(part).buffer(margin, join_style="mitre").exterior for part in parts]
     grown = [convex_outline("body", np.asarray(ring.coords)[:-1]) for ring in rings]
     vertices, offsets = flatten(grown)
-    return core.Footprint(vertices, offsets, float(np.hypot(*vertices.T).max()))
+    return vertices, offsets, float(np.hypot(*vertices.T).max())
 
 
 def compose(frame: FloatArray, pose: FloatArray) -> FloatArray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from pushplan.planners.rearrangement.placing.contact import ahead_of, compose, i
 from pushplan.planners.rearrangement.placing.curves import Turning
 from pushplan.planners.rearrangement.placing.place_order import PlaceChoice
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
-from pushplan.world import RobotModel, Twist, World
+from pushplan.world import Plan, RobotModel, Twist, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import path_length
 
@@ -67,7 +68,7 @@ class PlaceExecution:
         self._robot = robot
         self._goal = choice.push.object_pose
         self._stages: list[Callable[[World], Follower]] = [
-            lambda now: self._on_the_way(choice.way),
+            partial(self._on_the_way, choice.way),
             self._into_contact,
             self._along_the_curve,
             self._back,
@@ -98,17 +99,15 @@ class PlaceExecution:
         found = np.flatnonzero(world.movables.ids == self.push.label)
         return world.movables.poses[found[0]] if len(found) else None
 
-    def _on_the_way(self, way: Legs | FloatArray) -> Follower:
-        follower = Transit(self._robot, way, self._config)
+    def _on_the_way(self, way: Legs | FloatArray, world: World) -> Follower:
+        return partial(self._to_start, Transit(self._robot, way, self._config))
 
-        def command(world: World, held: float) -> Twist | None:
-            twist = follower.command(world, held)
-            if twist is None and not follower.arrived:
-                self.stuck = True
-                self._stages.clear()
-            return twist
-
-        return command
+    def _to_start(self, transit: Transit, world: World, held: float) -> Twist | None:
+        twist = transit.command(world, held)
+        if twist is None and not transit.arrived:
+            self.stuck = True
+            self._stages.clear()
+        return twist
 
     def _into_contact(self, world: World) -> Follower:
         there = self._object(world)
@@ -131,14 +130,12 @@ class PlaceExecution:
             return lambda world, held: None
         if self._config.mpc:
             return self._by_prediction(world, poses, there)
-        follow = self._through(poses)
+        return partial(self._while_in_contact, self._through(poses))
 
-        def command(world: World, held: float) -> Twist | None:
-            there = self._object(world)
-            lost = there is None or self._is_lost(world, there)
-            return None if lost else follow(world, held)
-
-        return command
+    def _while_in_contact(self, follow: Follower, world: World, held: float) -> Twist | None:
+        there = self._object(world)
+        lost = there is None or self._is_lost(world, there)
+        return None if lost else follow(world, held)
 
     def _from_here(self, here: FloatArray, there: FloatArray) -> FloatArray:
         """(N, 3) poses of the push from where contact was made, with the object as it lies."""
@@ -179,28 +176,34 @@ class PlaceExecution:
             )
         )
         pusher.reset(world)
-        stall = StallChecker(self._robot)
         progress = ProgressChecker(
             decrease_by(_PROGRESS * self._robot.circumscribed_radius), _PATIENCE
         )
+        drive = partial(self._predict, pusher, plan, length, StallChecker(self._robot), progress)
+        return partial(self._while_in_contact, drive)
+
+    def _predict(
+        self,
+        pusher: PushingMpc,
+        plan: Plan,
+        length: float,
+        stall: StallChecker,
+        progress: ProgressChecker[float],
+        world: World,
+        held: float,
+    ) -> Twist | None:
+        """The next command of a push along a plan, ``length`` [m] of which are the object's way."""
+        if stall.update(world.robot_pose, world.time):
+            return None
+        twist = pusher.command(world, plan)
+        left = length - pusher.along
+        if left < 1e-6 or not progress.update(left, world.time):
+            return None
         braking = min(self._robot.max_acceleration, self._robot.max_speed / _BRAKING)
-
-        def command(world: World, held: float) -> Twist | None:
-            there = self._object(world)
-            if there is None or self._is_lost(world, there):
-                return None
-            if stall.update(world.robot_pose, world.time):
-                return None
-            twist = pusher.command(world, plan)
-            left = length - pusher.along
-            if left < 1e-6 or not progress.update(left, world.time):
-                return None
-            slower = min(1.0, approach_speed(left, braking, held) / max(twist.linear, 1e-9))
-            twist = Twist(slower * twist.linear, slower * twist.angular)
-            stall.send(twist)
-            return twist
-
-        return command
+        slower = min(1.0, approach_speed(left, braking, held) / max(twist.linear, 1e-9))
+        twist = Twist(slower * twist.linear, slower * twist.angular)
+        stall.send(twist)
+        return twist
 
     def _is_lost(self, world: World, there: FloatArray) -> bool:
         """True if an object at a pose (3,) is not before the bumper."""
@@ -225,8 +228,7 @@ class PlaceExecution:
 
     def _through(self, poses: FloatArray) -> Follower:
         poses[:, 2] = np.unwrap(poses[:, 2])
-        follower = PoseFollower(self._robot, poses, self._config.response)
-        return lambda world, held: follower.command(world.robot_pose, world.time, held)
+        return PoseFollower(self._robot, poses, self._config.response).drive
 
 
 class Transit:
