@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import multiprocessing
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from itertools import pairwise
+from multiprocessing.reduction import ForkingPickler
 from typing import Any
 
 import numpy as np
@@ -19,9 +21,11 @@ from gymnasium.vector.utils import (
 )
 from numpy.typing import ArrayLike, NDArray
 
+from pushplan.errors import describe
 from pushplan.world import InvalidInputError, PushplanError, UnknownNameError
 from pushplan.world.checks import integer
 
+_GUARD = "put what makes it under `if __name__ == '__main__':`, which worker processes leave out"
 _Batch = tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
 """Observations, rewards, terminated, truncated and information of some environments."""
 
@@ -43,7 +47,8 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
     et al. 2022), do not: the environments of one worker are a batch of its own, and take their next
     actions while the others are still busy.
 
-    Worker processes are spawned: a script needs its ``if __name__ == "__main__":``.
+    Worker processes are spawned: a script needs its ``if __name__ == "__main__":``. Without it
+    they end with a line on standard error, and this class raises a `VectorWorkerError`.
 
     Args:
         env_fns: make the environments; all have the same spaces, whose elements are arrays.
@@ -58,6 +63,7 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
     Raises:
         InvalidInputError: if there is no environment, or a number makes no sense.
         UnknownNameError: if the mode is unknown; the message lists the valid ones.
+        VectorWorkerError: if a worker process ends before its environments are made.
     """
 
     def __init__(
@@ -68,6 +74,8 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
         copy: bool = True,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
     ) -> None:
+        if getattr(multiprocessing.current_process(), "_inheriting", False):
+            sys.exit(f"a worker process made a vector environment as it imported the script: {_GUARD}")
         super().__init__()
         if not env_fns:
             raise InvalidInputError("env_fns must have at least one environment, got none")
@@ -105,8 +113,12 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
         ]
         try:
             self._ask(_make, [()] * workers)
-        except BaseException:
+        except BaseException as error:
             self.close()
+            if isinstance(error, VectorWorkerError):
+                raise VectorWorkerError(
+                    f"a worker process ended before it had its environments: in a script, {_GUARD}"
+                ) from None
             raise
 
     def reset(
@@ -240,7 +252,12 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
         self._pending[self._pools[n].submit(_step, np.asarray(actions))] = n
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
-        """Call a method of every environment, or read an attribute, and return the answers."""
+        """Call a method of every environment, or read an attribute, and return the answers.
+
+        Raises:
+            InvalidInputError: if an argument cannot be sent to another process.
+        """
+        _check_sendable(name, (args, kwargs))
         answers = self._ask(_call, [(name, args, kwargs)] * self.workers)
         return tuple(value for values in answers for value in values)
 
@@ -249,7 +266,12 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
         return self.call(name)
 
     def set_attr(self, name: str, values: Any) -> None:
-        """Set an attribute of every environment: one value for all, or a list with one for each."""
+        """Set an attribute of every environment: one value for all, or a list with one for each.
+
+        Raises:
+            InvalidInputError: if there are too few or too many, or one cannot be sent to another
+                process.
+        """
         each = values
         if not isinstance(values, list | tuple):
             each = [values] * self.num_envs
@@ -257,6 +279,7 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
             raise InvalidInputError(
                 f"values must be one for each of {self.num_envs} environments, got {len(each)}"
             )
+        _check_sendable(name, each)
         self._ask(_set_attr, [(name, list(each[share])) for share in self._shares])
 
     def render(self) -> tuple[Any, ...]:
@@ -278,12 +301,12 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
     def _answer(self, future: Future[Any], n: int) -> Any:
         try:
             return future.result()
-        except BrokenProcessPool as error:
+        except BrokenProcessPool:
             share = self._shares[n]
             raise VectorWorkerError(
                 f"the worker process of environments {share.start} to {share.stop - 1} has "
                 "ended: close this vector environment, make another"
-            ) from error
+            ) from None
 
     def _check_open(self, name: str) -> None:
         if self.closed:
@@ -321,6 +344,16 @@ def _merged(
             if value is not None:
                 out[key][share] = value
     return out
+
+
+def _check_sendable(name: str, values: Any) -> None:
+    """Refuse what a worker process could not be given, in our words rather than pickle's."""
+    try:
+        ForkingPickler.dumps(values)
+    except Exception as error:  # classes of a user may raise anything
+        raise InvalidInputError(
+            f"{name}: a value cannot be sent to a worker process: {describe(error)}"
+        ) from error
 
 
 _kept: list[Any] = []
