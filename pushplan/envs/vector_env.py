@@ -25,7 +25,7 @@ from pushplan.errors import describe
 from pushplan.world import InvalidInputError, PushplanError, UnknownNameError
 from pushplan.world.checks import integer
 
-_GUARD = "put what makes it under `if __name__ == '__main__':`, which worker processes leave out"
+_GUARD = "put the call under `if __name__ == '__main__':`, which worker processes leave out"
 _Batch = tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
 """Observations, rewards, terminated, truncated and information of some environments."""
 
@@ -75,7 +75,9 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
     ) -> None:
         if getattr(multiprocessing.current_process(), "_inheriting", False):
-            sys.exit(f"a worker process made a vector environment as it imported the script: {_GUARD}")
+            sys.exit(
+                f"a worker process made a vector environment as it imported the script: {_GUARD}"
+            )
         super().__init__()
         if not env_fns:
             raise InvalidInputError("env_fns must have at least one environment, got none")
