@@ -14,8 +14,9 @@ from typing import Any
 
 import pytest
 
-from pushplan.cli import build_parser, main
+from pushplan.cli import main
 from pushplan.cli.doctor import BASE
+from pushplan.cli.parser import build_parser
 from pushplan.errors import unknown_name_message
 from pushplan.imports.on_demand import EXTRAS
 
