@@ -10,6 +10,7 @@ import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from importlib.resources import files
+from itertools import chain
 from typing import Any, NoReturn
 
 from pushplan import __version__
@@ -138,12 +139,13 @@ def _add_commands(
             _add_commands(command, about["commands"], shared)
             continue
         command.set_defaults(run=about["run"])
-        for option in about["options"]:
+        for option in [*about.get("options", ()), {"shared": about.get("also", ())}]:
             group: argparse._ActionsContainer = command
             if "one_of" in option:
                 group = command.add_mutually_exclusive_group()
             for one in option.get("one_of", [option]):
-                for each in shared[one["shared"]] if "shared" in one else [one]:
+                entries = [[one]] if "name" in one else [shared[name] for name in one["shared"]]
+                for each in chain(*entries):
                     _add_option(group, **each)
 
 
