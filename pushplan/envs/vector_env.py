@@ -254,12 +254,7 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
         self._pending[self._pools[n].submit(_step, np.asarray(actions))] = n
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
-        """Call a method of every environment, or read an attribute, and return the answers.
-
-        Raises:
-            InvalidInputError: if an argument cannot be sent to another process.
-        """
-        _check_sendable(name, (args, kwargs))
+        """Call a method of every environment, or read an attribute, and return the answers."""
         answers = self._ask(_call, [(name, args, kwargs)] * self.workers)
         return tuple(value for values in answers for value in values)
 
@@ -268,12 +263,7 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
         return self.call(name)
 
     def set_attr(self, name: str, values: Any) -> None:
-        """Set an attribute of every environment: one value for all, or a list with one for each.
-
-        Raises:
-            InvalidInputError: if there are too few or too many, or one cannot be sent to another
-                process.
-        """
+        """Set an attribute of every environment: one value for all, or a list with one for each."""
         each = values
         if not isinstance(values, list | tuple):
             each = [values] * self.num_envs
@@ -281,7 +271,6 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
             raise InvalidInputError(
                 f"values must be one for each of {self.num_envs} environments, got {len(each)}"
             )
-        _check_sendable(name, each)
         self._ask(_set_attr, [(name, list(each[share])) for share in self._shares])
 
     def render(self) -> tuple[Any, ...]:
@@ -295,7 +284,14 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
 
     def _ask(self, function: Callable[..., Any], arguments: Sequence[tuple[Any, ...]]) -> list[Any]:
         """The results of a function in each worker, with arguments for each."""
-        self._check_idle(function.__name__.strip("_"))
+        name = function.__name__.strip("_")
+        self._check_idle(name)
+        try:
+            ForkingPickler.dumps(arguments)
+        except Exception as error:  # classes of a user raise errors of many kinds
+            raise InvalidInputError(
+                f"{name}: a value cannot be sent to a worker process: {describe(error)}"
+            ) from error
         futures = [self._pools[n].submit(function, *each) for n, each in enumerate(arguments)]
         wait(futures)  # all of them: after an error no worker is busy
         return [self._answer(future, n) for n, future in enumerate(futures)]
@@ -346,16 +342,6 @@ def _merged(
             if value is not None:
                 out[key][share] = value
     return out
-
-
-def _check_sendable(name: str, values: Any) -> None:
-    """Refuse what a worker process could not be given, in our words rather than pickle's."""
-    try:
-        ForkingPickler.dumps(values)
-    except Exception as error:  # classes of a user may raise anything
-        raise InvalidInputError(
-            f"{name}: a value cannot be sent to a worker process: {describe(error)}"
-        ) from error
 
 
 _kept: list[Any] = []

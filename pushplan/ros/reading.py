@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.errors import short
 from pushplan.world import Drive, InvalidInputError, Plan, PriceMap, RobotModel, StaticMap, Twist
 from pushplan.world.checks import FloatArray, IntArray, array
 from pushplan.world.polyline import arc_lengths, goes_back, path_length
@@ -215,19 +214,15 @@ def _grid(message: Any, frame: str | None) -> tuple[IntArray, float, FloatArray]
     _in_frame(message, frame)
     height = int(message.info.height)
     width = int(message.info.width)
-    cells = message.data
-    if isinstance(cells, bytes | bytearray):
-        cells = memoryview(cells)
-    cells = np.asarray(cells)
-    if cells.dtype.kind not in "iu" and cells.size:
-        raise InvalidInputError(
-            f"the cells of an OccupancyGrid are whole numbers, got {short(message.data)}"
-        )
-    odd = cells[(cells < -1) | ((cells > 100) & (cells != _UNKNOWN))]
+    data = message.data
+    cells = np.asarray(memoryview(data) if isinstance(data, bytes | bytearray) else data)
+    odd = cells
+    if cells.dtype.kind in "iu":
+        odd = cells[(cells < -1) | ((cells > 100) & (cells != _UNKNOWN))]
     if odd.size:
         raise InvalidInputError(
-            f"an OccupancyGrid holds -1 or, unsigned, {_UNKNOWN} (unknown) and 0 to 100 [%], "
-            f"got {odd.flat[0]}"
+            f"an OccupancyGrid holds whole numbers: -1 or, unsigned, {_UNKNOWN} for unknown, else "
+            f"0 to 100 [%], got {odd.flat[0]}"
         )
     cells = np.where(cells == _UNKNOWN, -1, cells.astype(np.int64))
     if height * width != len(cells):

@@ -172,9 +172,9 @@ def test_errors_of_a_worker_arrive_here_and_harm_nothing(shared):
     with pytest.raises(AttributeError, match="nonsense"):
         envs.call("nonsense")
     for unreadable in (lambda: None, [1, 2, lambda: None]):
-        with pytest.raises(InvalidInputError, match="note: a value cannot be sent to a worker"):
+        with pytest.raises(InvalidInputError, match="set_attr: a value cannot be sent to a worker"):
             envs.set_attr("note", unreadable)
-        with pytest.raises(InvalidInputError, match="close: a value cannot be sent to a worker"):
+        with pytest.raises(InvalidInputError, match="call: a value cannot be sent to a worker"):
             envs.call("close", unreadable)
     envs.set_attr("note", [1, 2, 3])
     assert envs.get_attr("note") == (1, 2, 3)  # answers are those of this request

@@ -192,9 +192,9 @@ def test_cells_may_be_signed_or_unsigned(shown):
         (np.array([0, 2**64 - 1, 0, 0, 0, 0], dtype=np.uint64), f"got {2**64 - 1}"),
         (np.array([0, 200, 0, 0, 0, 0], dtype=np.uint8), "0 to 100 [%], got 200"),
         ([0, -2, 0, 0, 0, 0], "0 to 100 [%], got -2"),
-        (np.full(6, 0.5), "are whole numbers"),
-        (["a"] * 6, "are whole numbers"),
-        (None, "are whole numbers"),
+        (np.full(6, 0.5), "holds whole numbers"),
+        (["a"] * 6, "holds whole numbers"),
+        (None, "holds whole numbers"),
     ],
 )
 def test_cells_that_no_grid_holds_are_refused(cells, told):
