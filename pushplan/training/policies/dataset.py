@@ -155,6 +155,8 @@ def record(
         "hindsight": hindsight,
     }
     counts = _counts(folder, about)
+    folder.mkdir(parents=True, exist_ok=True)
+    _write(folder, about, counts)  # the mark of a data set comes first
     make_folder(folder / "data")
     for index in range(counts["starts_done"], episodes):
         env = envs[index % len(envs)]
@@ -169,13 +171,17 @@ def record(
                     counts["total_episodes"] += 1
                     counts["total_steps"] += len(each.rows)
         counts["starts_done"] += 1
-        text = json.dumps({**about, **counts}, indent=2) + "\n"
-        write_atomic(folder / METADATA, text.encode())
-        said = (counts["total_steps"], counts["successes"])
-        log.info("%d of %d starts: %d steps, %d successes", index + 1, episodes, *said)
+        _write(folder, about, counts)
     for env in envs:
         env.close()
     return folder
+
+
+def _write(folder: Path, about: Mapping[str, Any], counts: Mapping[str, int]) -> None:
+    text = json.dumps({**about, **counts}, indent=2) + "\n"
+    write_atomic(folder / METADATA, text.encode())
+    said = (counts["starts_done"], about["starts"], counts["total_steps"], counts["successes"])
+    log.info("%d of %d starts: %d steps, %d successes", *said)
 
 
 def _counts(folder: Path, about: Mapping[str, Any]) -> dict[str, int]:
