@@ -10,7 +10,7 @@ import os
 import sys
 import warnings
 
-TYPE_CHECKING = False
+TYPE_CHECKING = False  # as the module typing has it, whose import takes a while
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import TextIO
@@ -48,7 +48,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stderr.write("pushplan: interrupted\n")
         return 130
     except BrokenPipeError:  # the reader of our output has gone
-        _drop_output()
+        # Python flushes once more when it ends, which would fail again
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
 
 
@@ -107,11 +108,6 @@ def _in_plain_signs(error: UnicodeError) -> tuple[str, int]:
         plain = unicodedata.normalize("NFKD", sign).encode("ascii", "ignore").decode()
         written += _PLAIN.get(sign) or plain or ascii(sign)[1:-1]
     return written, error.end
-
-
-def _drop_output() -> None:
-    """Write nothing more: Python flushes once more when it ends, which would fail again."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _show_in_a_line(
