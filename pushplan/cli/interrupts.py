@@ -23,7 +23,8 @@ class Interrupts:
 
     def __enter__(self) -> None:
         """Take Ctrl-C over from Python; a job that a shell runs in the background ignores it."""
-        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        usual = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        if usual and hasattr(signal, "pthread_kill"):  # not on Windows
             signal.signal(signal.SIGINT, self._interrupt)
             sys.unraisablehook = self._dropped
 
