@@ -185,7 +185,7 @@ def _write(folder: Path, about: Mapping[str, Any], counts: Mapping[str, int]) ->
 
 
 def _counts(folder: Path, about: Mapping[str, Any]) -> dict[str, int]:
-    """What a data set of this description holds already, by key of its metadata.
+    """Return the counts of a data set of this description, by key of its metadata.
 
     Raises:
         InvalidInputError: if the folder holds one of another description.
