@@ -184,10 +184,9 @@ def _loops_over(function: ast.FunctionDef, calls: set[str]) -> bool:
 
 
 def _options(value: Any) -> int:
-    """Entries of a table of commands that are options."""
+    """Keys of a table of commands that are options."""
     if isinstance(value, dict):
-        own = str(value.get("name", "")).startswith("-")
-        return own + sum(map(_options, value.values()))
+        return sum(key.startswith("-") for key in value) + sum(map(_options, value.values()))
     return sum(map(_options, value)) if isinstance(value, list) else 0
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import parameters
 import public_names
 
-from pushplan.cli import build_parser
+from pushplan.cli.parser import build_parser
 
 if TYPE_CHECKING:
     from docutils.nodes import Element

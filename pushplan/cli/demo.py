@@ -42,12 +42,12 @@ def run(options: argparse.Namespace) -> int:
         about = {"suite": "demo"}
         run_batch(jobs, out=options.out, workers=workers, about=about, progress=progress)
     results = Results.load(options.out)
+    page = results.report()
     for row in results.rows:
         how = "success" if row.success else row.reason
         if row.interaction_work_kg_m is not None:  # a job that failed has none
             how += f", work {row.interaction_work_kg_m:.3g} kg m"
         say(f"  {row.policy} in {row.task}: {how}")
-    page = results.report()
     say(f"page: {page}")
     if not options.no_open and sys.stdout.isatty() and has_screen():  # no browser in the terminal
         webbrowser.open(page.absolute().as_uri())

@@ -42,6 +42,8 @@ def run(options: argparse.Namespace) -> int:
     if not tour.status.has_tour:
         tell(options, about, *lines, f"  {tour.status.label}: {tour.status.remedy}")
         return 1
+    if options.out:
+        write_tour(options.out, tour.nodes, name=f"{instance.name} {tour.cost:.10g}")
     tell(
         options,
         about,
@@ -51,7 +53,5 @@ def run(options: argparse.Namespace) -> int:
         f"found after {milliseconds(stats.best_s)}",
         "  nodes " + " ".join(map(str, nodes)),
     )
-    if options.out:
-        write_tour(options.out, tour.nodes, name=f"{instance.name} {tour.cost:.10g}")
     say_written(options, options.out)
     return 0

@@ -25,13 +25,13 @@ def run(options: argparse.Namespace) -> int:
         radii = {"min": field.radii.min(), "max": field.radii.max(), "mean": field.radii.mean()}
         about |= {f"radius_{name}_m": float(value) for name, value in radii.items()}
         lines.append("  radii {min:.3g} to {max:.3g} m, mean {mean:.3g} m".format(**radii))
-    tell(options, about, *lines)
     if options.out:
         from pushplan.scenarios import save_ice
 
         save_ice(field, options.out)
     if options.picture:
         _draw(field, options.picture)
+    tell(options, about, *lines)
     say_written(options, options.out, options.picture)
     return 0
 

@@ -138,13 +138,23 @@ def _add_commands(
             _add_commands(command, about["commands"], shared)
             continue
         command.set_defaults(run=about["run"])
-        for option in about["options"]:
-            group: argparse._ActionsContainer = command
-            if "one_of" in option:
-                group = command.add_mutually_exclusive_group()
-            for one in option.get("one_of", [option]):
-                for each in shared[one["shared"]] if "shared" in one else [one]:
-                    _add_option(group, **each)
+        _add_options(command, about.get("options", {}), shared)
+        for group in about.get("also", ()):
+            _add_options(command, shared[group], shared)
+
+
+def _add_options(
+    parser: argparse._ActionsContainer, options: Mapping[str, Any], shared: Mapping[str, Any]
+) -> None:
+    """Add the entries of ``options``, by the names that are their keys."""
+    for names, about in options.items():
+        if "one_of" in about:
+            _add_options(parser.add_mutually_exclusive_group(), about["one_of"], shared)
+        elif "shared" in about:
+            for name in names.split():
+                _add_options(parser, shared[name], shared)
+        else:
+            _add_option(parser, names, **about)
 
 
 def named(name: str) -> Any:
@@ -154,7 +164,7 @@ def named(name: str) -> Any:
 
 
 def _add_option(
-    parser: argparse._ActionsContainer, name: str, complete: str | None = None, **given: Any
+    parser: argparse._ActionsContainer, names: str, complete: str | None = None, **given: Any
 ) -> None:
     """Add one entry of ``commands.toml``."""
     if "type" in given:
@@ -163,15 +173,15 @@ def _add_option(
         given["choices"] = named(given["choices"])
     if given.get("default") == "cores":
         given["default"] = os.cpu_count() or 1
-    action = parser.add_argument(*name.split(), **given)
+    action = parser.add_argument(*names.split(), **given)
     if complete is not None:
 
-        def names(**_: Any) -> list[str]:
+        def completions(**_: Any) -> list[str]:
             from pushplan.cli.listing import names_of
 
             return names_of(complete)
 
-        action.completer = names  # type: ignore[attr-defined]
+        action.completer = completions  # type: ignore[attr-defined]
 
 
 def whole(low: int) -> Callable[[str], int]:

@@ -50,10 +50,6 @@ def run(options: argparse.Namespace) -> int:
             raise
         raise PushplanError(f"planner {spec.label!r} failed: {describe(error)}") from error
     data = _as_dict(options, spec.label, result)
-    if options.json:
-        say_json(data)
-    else:
-        _print(spec.label, result)
     if options.out:
         Path(options.out).write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
     if options.render:
@@ -62,6 +58,10 @@ def run(options: argparse.Namespace) -> int:
         title = f"{spec.label}: {result.status.label}"
         figure = draw_figure(Panel(world, plan=result.plan))
         save_figure(options.render, figure, title=title)
+    if options.json:
+        say_json(data)
+    else:
+        _print(spec.label, result)
     say_written(options, options.out, options.render)
     if objection is not None:
         raise PushplanError(f"planner {spec.label!r} says {result.status.label}, but {objection}")

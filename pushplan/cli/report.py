@@ -45,13 +45,21 @@ def run(options: argparse.Namespace) -> int:
 
 
 def show(results: Results, options: argparse.Namespace, **written: Any) -> None:
-    """Print the tables of a run and why episodes did not succeed, write its report.
+    """Write the report of a run, print its tables and why episodes did not succeed.
 
     Args:
         results: of the run.
         options: with the shared options "tables".
         written: as for `Results.report`.
     """
+    try:
+        page = results.report(pairs=options.pairs, **written)
+    finally:  # the tables are of use without a page, too
+        _say_tables(results, options)
+    say(f"page:    {page}")
+
+
+def _say_tables(results: Results, options: argparse.Namespace) -> None:
     from pushplan.evaluation.report.tables import on_few_lines
 
     tables = results.tables(settings=options.settings, pairs=options.pairs)
@@ -60,8 +68,6 @@ def show(results: Results, options: argparse.Namespace, **written: Any) -> None:
         say(line)
     if len(results.titles) > 1 and not options.settings:
         say(f"each of the {len(results.titles)} settings: --settings, and on the page")
-    page = results.report(pairs=options.pairs, **written)
-    say(f"page:    {page}")
 
 
 def show_json(results: Results, options: argparse.Namespace, **written: Any) -> None:

@@ -52,16 +52,16 @@ def run(options: argparse.Namespace) -> int:
         raise PolicyError(f"policy {spec.label!r} failed: {error}") from error
     finally:
         env.close()
+    if options.out:
+        save_episode(episode, options.out)
+    if camera is not None:
+        camera.write(episode)
     if options.json:
         row = blank_row(spec.label, scenario, Status.DONE, episode.reason)
         calls = len(episode.plan_times_s) or None
         say_json(scored_row(row, episode, calls).by_column())
     else:
         _print(spec.label, scenario, episode)
-    if options.out:
-        save_episode(episode, options.out)
-    if camera is not None:
-        camera.write(episode)
     say_written(options, options.out, options.render)
     return 0
 

@@ -25,6 +25,8 @@ def run(options: argparse.Namespace) -> int:
     scored = []
     for path in options.episodes:
         episode = load_episode(path)
+        if options.out:
+            save_episode(episode, options.out)
         if options.json:
             scored.append(
                 {
@@ -36,9 +38,7 @@ def run(options: argparse.Namespace) -> int:
             )
         else:
             say_scores(episode, options.metrics, f"{path}: ")
-        if options.out:
-            save_episode(episode, options.out)
-            say_written(options, options.out)
+        say_written(options, options.out)
     if options.json:
         say_json(scored)
     return 0

@@ -130,11 +130,15 @@ def export(options: argparse.Namespace) -> int:
     import logging
 
     from pushplan.evaluation import parse_policy
+    from pushplan.imports.on_demand import need
     from pushplan.training.policies.config import config_named, read_config
-    from pushplan.training.policies.dataset import read_metadata, record, to_minari
+    from pushplan.training.policies.dataset import METADATA, read_metadata, record, to_minari
     from pushplan.world import InvalidInputError
 
-    check_directory(options.out)
+    check_directory(options.out, "data set", METADATA)
+    if options.minari is not None:
+        need("minari")
+        need("h5py")
     _show_progress(logging.getLogger("pushplan.training"))
     given = options.config
     if given is None:
@@ -151,18 +155,22 @@ def export(options: argparse.Namespace) -> int:
         driver = parse_policy(options.driver)
         more["driver"] = driver.make()
         more["driver_label"] = driver.label
-    folder = record(
-        config,
-        spec.make(),
-        spec.label,
-        options.out,
-        episodes=options.episodes,
-        noise=options.noise,
-        hold=options.hold,
-        afresh=options.afresh,
-        hindsight=options.hindsight,
-        **more,
-    )
+    try:
+        folder = record(
+            config,
+            spec.make(),
+            spec.label,
+            options.out,
+            episodes=options.episodes,
+            noise=options.noise,
+            hold=options.hold,
+            afresh=options.afresh,
+            hindsight=options.hindsight,
+            **more,
+        )
+    except KeyboardInterrupt:
+        sys.stderr.write(f"stopped; the same command goes on with the data set in {options.out}\n")
+        raise
     about = read_metadata(folder)
     say(
         f"wrote {folder}: {about['total_episodes']} episodes, {about['total_steps']} steps, "

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import multiprocessing
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from itertools import pairwise
+from multiprocessing.reduction import ForkingPickler
 from typing import Any
 
 import numpy as np
@@ -19,10 +21,11 @@ from gymnasium.vector.utils import (
 )
 from numpy.typing import ArrayLike, NDArray
 
-from pushplan.errors import refuse_copy
+from pushplan.errors import describe, refuse_copy
 from pushplan.world import InvalidInputError, PushplanError, UnknownNameError
 from pushplan.world.checks import integer
 
+_GUARD = "put the call under `if __name__ == '__main__':`, which worker processes leave out"
 _Batch = tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
 """Observations, rewards, terminated, truncated and information of some environments."""
 
@@ -44,7 +47,8 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
     et al. 2022), do not: the environments of one worker are a batch of its own, and take their next
     actions while the others are still busy.
 
-    Worker processes are spawned: a script needs its ``if __name__ == "__main__":``.
+    Worker processes are spawned: a script needs its ``if __name__ == "__main__":``. Without it
+    they end with a line on standard error, and this class raises a `VectorWorkerError`.
 
     Args:
         env_fns: make the environments; all have the same spaces, whose elements are arrays.
@@ -59,6 +63,7 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
     Raises:
         InvalidInputError: if there is no environment, or a number makes no sense.
         UnknownNameError: if the mode is unknown; the message lists the valid ones.
+        VectorWorkerError: if a worker process ends before its environments are made.
     """
 
     __reduce_ex__ = refuse_copy
@@ -71,6 +76,10 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
         copy: bool = True,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
     ) -> None:
+        if getattr(multiprocessing.current_process(), "_inheriting", False):
+            sys.exit(
+                f"a worker process made a vector environment as it imported the script: {_GUARD}"
+            )
         super().__init__()
         if not env_fns:
             raise InvalidInputError("env_fns must have at least one environment, got none")
@@ -108,8 +117,12 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
         ]
         try:
             self._ask(_make, [()] * workers)
-        except BaseException:
+        except BaseException as error:
             self.close()
+            if isinstance(error, VectorWorkerError):
+                raise VectorWorkerError(
+                    f"a worker process ended before it had its environments: in a script, {_GUARD}"
+                ) from None
             raise
 
     def reset(
@@ -273,7 +286,14 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
 
     def _ask(self, function: Callable[..., Any], arguments: Sequence[tuple[Any, ...]]) -> list[Any]:
         """The results of a function in each worker, with arguments for each."""
-        self._check_idle(function.__name__.strip("_"))
+        name = function.__name__.strip("_")
+        self._check_idle(name)
+        try:
+            ForkingPickler.dumps(arguments)
+        except Exception as error:  # classes of a user raise errors of many kinds
+            raise InvalidInputError(
+                f"{name}: a value cannot be sent to a worker process: {describe(error)}"
+            ) from error
         futures = [self._pools[n].submit(function, *each) for n, each in enumerate(arguments)]
         wait(futures)  # all of them: after an error no worker is busy
         return [self._answer(future, n) for n, future in enumerate(futures)]
@@ -281,12 +301,12 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
     def _answer(self, future: Future[Any], n: int) -> Any:
         try:
             return future.result()
-        except BrokenProcessPool as error:
+        except BrokenProcessPool:
             share = self._shares[n]
             raise VectorWorkerError(
                 f"the worker process of environments {share.start} to {share.stop - 1} has "
                 "ended: close this vector environment, make another"
-            ) from error
+            ) from None
 
     def _check_open(self, name: str) -> None:
         if self.closed:

@@ -12,6 +12,7 @@ from pushplan.world import InvalidInputError, World
 from pushplan.world.checked_fields import CheckedFields, Limits, Shape
 from pushplan.world.checks import ArrayRecord, FloatArray, array
 from pushplan.world.polyline import path_lengths
+from pushplan.world.protocols import HasAttributes
 
 
 def checked_path(path: ArrayLike) -> FloatArray:
@@ -57,7 +58,7 @@ class Interaction(ArrayRecord, CheckedFields):
 
 
 @runtime_checkable
-class InteractionModel(Protocol):
+class InteractionModel(HasAttributes, Protocol):
     """Predicts what happens to the objects when the robot sweeps along a path."""
 
     def sweep(self, world: World, path: ArrayLike) -> Interaction:

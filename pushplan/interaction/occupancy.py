@@ -22,6 +22,7 @@ from pushplan.world import Movables, World
 from pushplan.world.checked_fields import CheckedFields, PositiveFloat, Shape
 from pushplan.world.checks import ArrayRecord, FloatArray, array
 from pushplan.world.outline import next_corner
+from pushplan.world.protocols import HasAttributes
 
 Patch = NDArray[np.float32]
 """Covered fractions of cells."""
@@ -97,7 +98,7 @@ class OccupancyForecast(CheckedFields):
 
 
 @runtime_checkable
-class OccupancyPredictor(Protocol):
+class OccupancyPredictor(HasAttributes, Protocol):
     """Predicts the occupancy that the robot leaves behind."""
 
     def predict(self, batch: PassageBatch) -> OccupancyForecast:

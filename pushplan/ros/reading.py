@@ -6,15 +6,15 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pushplan.world import Drive, InvalidInputError, Plan, PriceMap, RobotModel, StaticMap, Twist
-from pushplan.world.checks import FloatArray, array
+from pushplan.world.checks import FloatArray, IntArray, array
 from pushplan.world.polyline import arc_lengths, goes_back, path_length
 
 _TILT = math.cos(math.radians(15.0))  # steepest floor that still counts as a plane
 _ROUNDED = 0.999  # of the least time of a step: stamps and poses of a path are rounded
 _STAMP = 1e-6  # error of the time between two stamps [s]
+_UNKNOWN = 255  # an unknown cell, -1, as an unsigned byte
 _LATERAL = 1e-6  # speed that counts as none [m/s, rad/s]
 
 
@@ -205,13 +205,26 @@ def price_map_from(message: Any, frame: str | None = None, *, most: float) -> Pr
     return PriceMap.from_costmap(cells, side, origin, most=most)
 
 
-def _grid(message: Any, frame: str | None) -> tuple[NDArray[np.int8], float, FloatArray]:
-    """(rows, columns) cells, their side [m], and (3,) their origin."""
+def _grid(message: Any, frame: str | None) -> tuple[IntArray, float, FloatArray]:
+    """(rows, columns) cells, their side [m], and (3,) their origin.
+
+    Some bridges and logs show the bytes of the cells as unsigned: 255 is then an unknown cell.
+    """
     _expect(message, "nav_msgs/OccupancyGrid")
     _in_frame(message, frame)
     height = int(message.info.height)
     width = int(message.info.width)
-    cells: NDArray[np.int8] = np.asarray(message.data, dtype=np.int8)
+    data = message.data
+    cells = np.asarray(memoryview(data) if isinstance(data, bytes | bytearray) else data)
+    odd = cells
+    if cells.dtype.kind in "iu":
+        odd = cells[(cells < -1) | ((cells > 100) & (cells != _UNKNOWN))]
+    if odd.size:
+        raise InvalidInputError(
+            f"an OccupancyGrid holds whole numbers: -1 or, unsigned, {_UNKNOWN} for unknown, else "
+            f"0 to 100 [%], got {odd.flat[0]}"
+        )
+    cells = np.where(cells == _UNKNOWN, -1, cells.astype(np.int64))
     if height * width != len(cells):
         raise InvalidInputError(
             f"an OccupancyGrid of height {height} and width {width} needs {height * width} cells, "

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from pushplan.world.plan import Plan, PlanResult
+from pushplan.world.protocols import HasAttributes
 from pushplan.world.stop import Stop
 
 T = TypeVar("T")
@@ -60,7 +61,7 @@ class PlanningExecutor(Protocol):
 
 
 @runtime_checkable
-class ChoosesActions(Protocol):
+class ChoosesActions(HasAttributes, Protocol):
     """Names the action modes that it can drive in.
 
     A policy without it gets the first mode of the task; if the first action is then a `Twist` or
@@ -80,7 +81,7 @@ def action_modes(policy: object) -> tuple[str, ...]:
 
 
 @runtime_checkable
-class ChoosesObservation(Protocol):
+class ChoosesObservation(HasAttributes, Protocol):
     """Decides on what the environment observes; a policy without it looks at the `World` alone."""
 
     @property
@@ -89,7 +90,7 @@ class ChoosesObservation(Protocol):
 
 
 @runtime_checkable
-class ChecksEnvironment(Protocol):
+class ChecksEnvironment(HasAttributes, Protocol):
     """Is made for some environments only, as a trained network is."""
 
     def check_environment(self, env: Any, scenario: Any = None) -> None:
@@ -105,7 +106,7 @@ class ChecksEnvironment(Protocol):
 
 
 @runtime_checkable
-class ChecksScenario(Protocol):
+class ChecksScenario(HasAttributes, Protocol):
     """Knows without an environment which scenarios it is made for."""
 
     def incompatibility(self, scenario: Any) -> str | None:
@@ -113,7 +114,7 @@ class ChecksScenario(Protocol):
 
 
 @runtime_checkable
-class HoldsDecisions(Protocol):
+class HoldsDecisions(HasAttributes, Protocol):
     """Decides every few steps and keeps to what it decided in between."""
 
     @property
@@ -122,7 +123,7 @@ class HoldsDecisions(Protocol):
 
 
 @runtime_checkable
-class PlansBesideDriving(Protocol):
+class PlansBesideDriving(HasAttributes, Protocol):
     """Can plan while the robot drives on: on a robot, and in latency-aware simulation."""
 
     def plan_with(self, executor: PlanningExecutor) -> None:
@@ -135,7 +136,7 @@ class PlansBesideDriving(Protocol):
 
 
 @runtime_checkable
-class ExpectsNoise(Protocol):
+class ExpectsNoise(HasAttributes, Protocol):
     """Can be told how noisy the poses are that it gets, and asks for no more precision then."""
 
     def expect_noise(self, position: float, heading: float) -> None:
@@ -148,7 +149,7 @@ class ExpectsNoise(Protocol):
 
 
 @runtime_checkable
-class LogsPlans(Protocol):
+class LogsPlans(HasAttributes, Protocol):
     """Keeps what its planner returned."""
 
     @property
@@ -157,7 +158,7 @@ class LogsPlans(Protocol):
 
 
 @runtime_checkable
-class ShowsPlan(Protocol):
+class ShowsPlan(HasAttributes, Protocol):
     """Has a plan that a picture can show."""
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -12,8 +13,36 @@ from pushplan.world.scene import World
 from pushplan.world.stop import Stop
 
 
+@cache
+def _members(protocol: type) -> tuple[str, ...]:
+    """Names of the attributes that a protocol, or one below it, asks for."""
+    asking = [one for one in protocol.__mro__ if getattr(one, "_is_protocol", False)]
+    return tuple(name for one in asking for name in vars(one) if not name.startswith("_"))
+
+
+class _AsksTheObject(type(Protocol)):  # type: ignore[misc]
+    """Checks an object for attributes as ``hasattr`` does, also those of its ``__getattr__``.
+
+    Python does so up to 3.11 only; later versions look where nothing of the object can run, and so
+    miss the abilities of a policy that passes on what another one has.
+    """
+
+    def __instancecheck__(cls, instance: object) -> bool:
+        if not getattr(cls, "_is_protocol", False):
+            return bool(super().__instancecheck__(instance))
+        return all(
+            hasattr(instance, name)
+            and not (callable(getattr(cls, name)) and getattr(instance, name) is None)
+            for name in _members(cls)
+        )
+
+
+class HasAttributes(Protocol, metaclass=_AsksTheObject):
+    """Base of the contracts that an object keeps by having their attributes."""
+
+
 @runtime_checkable
-class Planner(Protocol):
+class Planner(HasAttributes, Protocol):
     """Finds a path for the robot in a snapshot of the world."""
 
     def plan(
@@ -36,7 +65,7 @@ class Planner(Protocol):
 
 
 @runtime_checkable
-class Controller(Protocol):
+class Controller(HasAttributes, Protocol):
     """Follows a plan, step by step."""
 
     def reset(self, world: World) -> None:
@@ -56,7 +85,7 @@ class Controller(Protocol):
 
 
 @runtime_checkable
-class Policy(Protocol):
+class Policy(HasAttributes, Protocol):
     """Chooses what to do, step after step: a planner with a controller, a network, a person.
 
     These two methods are all that is needed. What a policy may have beside them (which actions it

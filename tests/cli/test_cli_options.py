@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from pushplan.cli import build_parser, main
+from pushplan.cli import main
+from pushplan.cli.parser import build_parser
 
 RUN = ["run", "--task", "box_delivery", "--policy", "random"]
 

@@ -1,6 +1,9 @@
 """Pictures by MuJoCo's own camera."""
 
 import gc
+import os
+import subprocess
+import sys
 import weakref
 
 import numpy as np
@@ -76,3 +79,46 @@ def test_missing_graphics_say_what_to_install(monkeypatch):
     monkeypatch.setattr(mujoco_camera.mujoco, "GLContext", broken)
     with pytest.raises(MissingDependencyError, match="libegl1"):
         built(room(), GROUND).photograph(64, 48)
+
+
+RUN = ["-m", "pushplan", "run", "maze-3d-3", "--policy", "straight", "--seed", "1"]
+MAKE = """
+from pushplan.envs import PushEnv
+env = PushEnv(task="maze", simulator="mujoco", observation="state", render_mode="camera")
+env.reset(seed=0)
+env.render()
+"""
+
+
+@pytest.mark.parametrize(
+    ("backend", "command", "told"),
+    [
+        ("osmesa", RUN, "apt-get install libosmesa6), or unset MUJOCO_GL or set it to egl"),
+        (
+            "OSMesa",
+            ["-c", MAKE],
+            "apt-get install libosmesa6), or unset MUJOCO_GL or set it to egl",
+        ),
+        ("bogus", RUN, "MUJOCO_GL=bogus: unset MUJOCO_GL or set it to egl"),
+        ("off", ["-c", MAKE], "MUJOCO_GL=off: unset MUJOCO_GL or set it to egl"),
+        ("glfw", ["-c", MAKE], "MUJOCO_GL=glfw: unset MUJOCO_GL or set it to egl"),
+    ],
+)
+def test_a_backend_that_is_not_there_is_named_with_a_way_on(tmp_path, backend, command, told):
+    broken = tmp_path / "OpenGL"
+    broken.mkdir()
+    (broken / "__init__.py").touch()
+    (broken / "GL.py").write_text("None.glGetError\n")  # as PyOpenGL ends without its library
+    environ = {**os.environ, "MUJOCO_GL": backend, "PYTHONPATH": str(tmp_path)}
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "PYOPENGL_PLATFORM"):
+        environ.pop(name, None)
+    done = subprocess.run(
+        [sys.executable, *command], env=environ, capture_output=True, text=True, timeout=120
+    )
+    *before, last = done.stderr.splitlines()
+    assert told in last, done.stderr
+    if command is RUN:
+        assert done.returncode == 2 and not before
+    else:
+        assert last.startswith("pushplan.errors.MissingDependencyError: ")
+        assert "GLFWError" not in done.stderr

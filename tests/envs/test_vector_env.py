@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 from functools import partial
 
 import numpy as np
@@ -170,8 +172,10 @@ def test_errors_of_a_worker_arrive_here_and_harm_nothing(shared):
     with pytest.raises(AttributeError, match="nonsense"):
         envs.call("nonsense")
     for unreadable in (lambda: None, [1, 2, lambda: None]):
-        with pytest.raises(Exception, match="pickle"):
+        with pytest.raises(InvalidInputError, match="set_attr: a value cannot be sent to a worker"):
             envs.set_attr("note", unreadable)
+        with pytest.raises(InvalidInputError, match="call: a value cannot be sent to a worker"):
+            envs.call("close", unreadable)
     envs.set_attr("note", [1, 2, 3])
     assert envs.get_attr("note") == (1, 2, 3)  # answers are those of this request
     with pytest.raises(InvalidInputError, match="reset_mask must be of dtype bool"):
@@ -180,6 +184,20 @@ def test_errors_of_a_worker_arrive_here_and_harm_nothing(shared):
     for seed in ([1], [1, 2, 3, 4]):
         with pytest.raises(InvalidInputError, match="seed must have one value for each"):
             envs.reset(seed=seed)
+
+
+def test_a_script_without_its_guard_is_told_the_remedy(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(
+        "from pushplan.envs import make_vector\n"
+        "from pushplan.scenarios import Scenario\n"
+        "make_vector(Scenario('maze', variations={'boxes': 3}), 2, workers=2)\n"
+    )
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 1 and not done.stdout
+    *_, last = lines = done.stderr.splitlines()
+    assert "VectorWorkerError" in last and "under `if __name__ == '__main__':`" in last
+    assert len(lines) < 20 and done.stderr.count("Traceback") == 1, done.stderr
 
 
 def test_what_makes_no_sense_is_refused():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import sqlite3
 import subprocess
@@ -67,6 +68,44 @@ def test_wrong_values_are_one_line(run: Path) -> None:
             Results.load(run)
     done = salvage(run, run.parent / "saved")
     assert done.from_csv == 2 and done.rows == 6
+
+
+COMMANDS = ("status RUN", "verify RUN --workers 1", "compare RUN RUN", "export RUN rows.csv")
+
+
+@pytest.mark.parametrize(
+    "note",
+    [{"began": text} for text in ("yesterday", "2026-02-30T10:00:00.000Z", "2026-02-03", "", None)]
+    + [{"began": "2026-02-03T10:00:00.000"}, {"jobs": "many"}, {"done": None}],
+    ids=str,
+)
+def test_odd_notes_on_a_call_are_one_line(
+    run: Path, note: dict[str, object], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with sqlite3.connect(run / "results.db") as db:
+        ((runs,),) = db.execute("SELECT value FROM about WHERE key = 'runs'")
+        changed = [{**json.loads(runs)[0], **note}]
+        db.execute("UPDATE about SET value = ? WHERE key = 'runs'", (json.dumps(changed),))
+    for command in COMMANDS:
+        words = [str(run) if word == "RUN" else word for word in command.split()]
+        assert main(["runs", *words]) == 2
+        said = capsys.readouterr().err
+        assert "is damaged" in said and "runs salvage" in said and said.count("\n") == 1
+    saved = run.parent / "saved"
+    assert main(["runs", "salvage", str(run), str(saved)]) == 0
+    assert main(["runs", "status", str(saved)]) == 0
+
+
+@pytest.mark.parametrize("date", ["2026-99-99T10:00:00.000Z", "9999-01-01T00:00:00.000Z", "0001"])
+def test_odd_dates_of_rows_are_one_line_or_no_matter(
+    run: Path, date: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with sqlite3.connect(run / "results.db") as db:
+        db.execute("UPDATE results SET began = ? WHERE seed = 1", (date,))
+    for command in COMMANDS[:1], COMMANDS[2:3]:
+        words = [str(run) if word == "RUN" else word for word in command[0].split()]
+        code = main(["runs", *words])
+        assert (code, capsys.readouterr().err.count("\n")) in ((0, 0), (2, 1))
 
 
 @pytest.mark.slow

@@ -68,6 +68,40 @@ def test_networks_have_the_abilities_of_their_kind():
     assert not isinstance(policy, LogsPlans | PlansBesideDriving)
 
 
+class PassesOn:
+    """Has what another policy has, without a class that says so."""
+
+    def __init__(self, inner: object) -> None:
+        self._inner = inner
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self._inner, name)
+
+
+def test_an_ability_is_what_the_policy_answers_not_what_its_class_holds():
+    """Since Python 3.12 protocols look at the class alone."""
+    inner = make_policy("kinodynamic-rrt")
+    for ability in (Policy, ChoosesActions, PlansBesideDriving, LogsPlans, ShowsPlan):
+        assert isinstance(inner, ability) and isinstance(PassesOn(inner), ability)
+    assert not isinstance(PassesOn(inner), HoldsDecisions)
+
+    class Bad(Straight):
+        @property
+        def plan_log(self):
+            raise ValueError("no log")
+
+    class Without(Straight):
+        plan_with = None
+
+        @property
+        def plan_log(self):
+            raise AttributeError("no log")
+
+    with pytest.raises(ValueError, match="no log"):
+        isinstance(Bad(), LogsPlans)
+    assert not isinstance(Without(), LogsPlans | PlansBesideDriving)
+
+
 def test_a_policy_that_gives_a_twist_gets_the_first_action_mode_that_takes_one():
     settings = JobSettings()
     episodes = []

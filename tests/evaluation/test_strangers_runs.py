@@ -13,7 +13,8 @@ from pathlib import Path
 import pytest
 from evaluation_doubles import stored_run
 
-from pushplan.cli import build_parser, main
+from pushplan.cli import main
+from pushplan.cli.parser import build_parser
 from pushplan.evaluation import Results
 from pushplan.evaluation.report.comparing import read_rules
 from pushplan.world import InvalidInputError
@@ -24,7 +25,7 @@ def one_parser() -> Iterator[None]:
     """Build the parser once: that takes longer than most of the four hundred commands here."""
     parser = build_parser()
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("pushplan.cli.build_parser", lambda: parser)
+        patched.setattr("pushplan.cli.parser.build_parser", lambda: parser)
         yield
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import array
 import math
+import re
 
 import numpy as np
 import pytest
@@ -18,6 +20,7 @@ from pushplan.ros import (
     plan_from,
     polygon_from,
     pose_from,
+    price_map_from,
     static_map_from,
     time_from,
     twist_from,
@@ -156,6 +159,50 @@ def test_a_grid_becomes_the_same_map(origin):
         assert len(seen.polygons) == len(meant.polygons)
         for a, b in zip(seen.polygons, meant.polygons, strict=True):
             np.testing.assert_allclose(a, b, atol=1e-12)
+
+
+CELLS = [[0, 100, -1], [50, 65, 0]]
+
+
+@pytest.mark.parametrize(
+    "shown",
+    [
+        lambda cells: cells.view(np.uint8),
+        lambda cells: cells.view(np.uint8).astype(np.int64),
+        lambda cells: cells.view(np.uint8).astype(np.uint64),
+        lambda cells: cells.view(np.uint8).tolist(),
+        lambda cells: array.array("B", cells.tobytes()),
+        lambda cells: array.array("b", cells.tolist()),
+        lambda cells: cells.tobytes(),
+        lambda cells: bytearray(cells.tobytes()),
+        lambda cells: cells.tolist(),
+    ],
+)
+def test_cells_may_be_signed_or_unsigned(shown):
+    message = MESSAGES.occupancy(CELLS, 0.5)
+    meant = static_map_from(message), price_map_from(message, most=2.0)
+    message.data = shown(np.array(CELLS, dtype=np.int8).ravel())
+    assert (static_map_from(message), price_map_from(message, most=2.0)) == meant
+
+
+@pytest.mark.parametrize(
+    ("cells", "told"),
+    [
+        (np.array([0, 300, 0, 0, 0, 0]), "0 to 100 [%], got 300"),
+        (np.array([0, 2**64 - 1, 0, 0, 0, 0], dtype=np.uint64), f"got {2**64 - 1}"),
+        (np.array([0, 200, 0, 0, 0, 0], dtype=np.uint8), "0 to 100 [%], got 200"),
+        ([0, -2, 0, 0, 0, 0], "0 to 100 [%], got -2"),
+        (np.full(6, 0.5), "holds whole numbers"),
+        (["a"] * 6, "holds whole numbers"),
+        (None, "holds whole numbers"),
+    ],
+)
+def test_cells_that_no_grid_holds_are_refused(cells, told):
+    message = MESSAGES.occupancy(CELLS, 0.5)
+    message.data = cells
+    for read in (static_map_from, lambda grid: price_map_from(grid, most=2.0)):
+        with pytest.raises(InvalidInputError, match=re.escape(told)):
+            read(message)
 
 
 def bad(name):

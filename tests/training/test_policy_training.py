@@ -484,9 +484,73 @@ class TestDataset:
             record(config, make_policy("straight"), "straight", tmp_path / "data", episodes=1)
         assert not (tmp_path / "data").exists()
 
+    @pytest.mark.parametrize("options", [{"noise": 0.05}, {"noise": 0.2, "afresh": True}], ids=str)
+    def test_an_export_that_was_ended_goes_on_to_the_same_bytes(self, tmp_path, options):
+        from pushplan.planners import make_policy
+
+        def export(folder, limit=10**9, **changes):
+            """Record four starts, and end after so many actions."""
+            straight = make_policy("straight")
+            act = straight.act
+            left = [limit]
+
+            def limited(world, observation):
+                left[0] -= 1
+                if left[0] < 0:
+                    raise KeyboardInterrupt
+                return act(world, observation)
+
+            straight.act = limited
+            given = {"episodes": 4, **options, **changes}
+            record(tiny("bc"), straight, "straight", folder, **given)
+            return limit - left[0]
+
+        def files(folder):
+            found = [path for path in folder.rglob("*") if path.is_file()]
+            return {str(path.relative_to(folder)): path.read_bytes() for path in found}
+
+        whole, parts = tmp_path / "whole", tmp_path / "parts"
+        actions = export(whole)
+        for limit in (0, actions // 2, actions // 3):  # before, amid and after starts
+            with pytest.raises(KeyboardInterrupt):
+                export(parts, limit)
+            kept = json.loads((parts / "metadata.json").read_text())["total_episodes"]
+            (parts / "data" / f"episode_{kept:05d}.npz").write_bytes(b"PK torn")
+        with pytest.raises(SchemaError, match="of 4 starts are done: the command that began it"):
+            read_metadata(parts)
+        before = files(parts)
+        with pytest.raises(InvalidInputError, match="data set with another noise, hold: ask for"):
+            export(parts, noise=0.5, hold=7)
+        assert files(parts) == before
+        assert export(parts) < actions  # what is there is not made again
+        assert files(parts) == files(whole)
+        assert export(parts) == 0 and files(parts) == files(whole)
+
+    def test_a_folder_of_the_users_is_left_alone(self, tmp_path, capsys):
+        (tmp_path / "notes.txt").write_text("mine")
+        words = ["--policy", "straight", "--task", "maze", "--episodes", "1"]
+        assert main(["dataset", "export", *words, "--out", str(tmp_path)]) == 2
+        assert "is no data set, there is no metadata.json in it" in capsys.readouterr().err
+        assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
+
+    def test_ctrl_c_says_how_to_go_on(self, tmp_path, capsys, monkeypatch):
+        def interrupted(*args, **options):
+            raise KeyboardInterrupt
+
+        monkeypatch.setattr("pushplan.training.policies.dataset.record", interrupted)
+        words = ["--policy", "straight", "--task", "maze", "--episodes", "1"]
+        assert main(["dataset", "export", *words, "--out", str(tmp_path / "x")]) == 130
+        assert "the same command goes on with the data set in" in capsys.readouterr().err
+
     def test_damage_is_said(self, data, tmp_path):
-        with pytest.raises(InvalidInputError, match="not empty"):
-            record(tiny("bc"), None, "x", data, episodes=1)
+        from pushplan.planners import make_policy
+
+        with pytest.raises(InvalidInputError, match="holds a data set with another policy, starts"):
+            record(tiny("bc"), make_policy("random"), "x", data, episodes=1, noise=0.05)
+        (tmp_path / "mine").mkdir()
+        (tmp_path / "mine" / "notes.txt").touch()
+        with pytest.raises(InvalidInputError, match="not empty and is no data set"):
+            record(tiny("bc"), None, "x", tmp_path / "mine", episodes=1)
         with pytest.raises(SchemaError, match="data set"):
             read_metadata(tmp_path)
         (tmp_path / "data").mkdir()

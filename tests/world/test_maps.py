@@ -270,3 +270,21 @@ def test_a_file_that_is_no_picture_is_refused(tmp_path):
     (tmp_path / "map.yaml").write_text(yaml.safe_dump(META))
     with pytest.raises(SchemaError, match="cannot read the picture"):
         load_nav2_map(tmp_path / "map.yaml")
+
+
+@pytest.mark.parametrize("ending", ["jpg", "jpeg", "JPG"])
+def test_a_jpeg_is_read_and_other_formats_are_told_which_are(tmp_path, ending):
+    shades = np.full((16, 24), 254, dtype=np.uint8)
+    shades[:8, 8:16] = 0  # whole blocks of 8 pixels, which the format keeps
+    for name in (f"map.{ending}", "map.png"):
+        picture = Image.fromarray(shades).convert("RGB" if ending == "jpeg" else "L")
+        picture.save(tmp_path / name, **({} if name == "map.png" else {"quality": 95}))
+        (tmp_path / f"{name}.yaml").write_text(yaml.safe_dump({**META, "image": name}))
+    exact = read_nav2_grid(tmp_path / "map.png.yaml")[0]
+    assert (read_nav2_grid(tmp_path / f"map.{ending}.yaml")[0] == exact).all()
+    for name in ("map.gif", "map.tiff", "map.webp"):
+        Image.fromarray(shades).save(tmp_path / name)
+        (tmp_path / "map.yaml").write_text(yaml.safe_dump({**META, "image": name}))
+        with pytest.raises(SchemaError, match="no whole picture in PGM, PNG, BMP or JPEG") as told:
+            load_nav2_map(tmp_path / "map.yaml")
+        assert "object at" not in str(told.value)

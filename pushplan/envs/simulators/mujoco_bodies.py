@@ -6,10 +6,10 @@ import logging
 import math
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from pushplan.envs.simulators.base import Materials
+from pushplan.envs.simulators.mujoco_library import mujoco
 from pushplan.envs.simulators.mujoco_model import scene_model
 from pushplan.envs.simulators.mujoco_options import MujocoOptions
 from pushplan.envs.simulators.mujoco_sleep import (

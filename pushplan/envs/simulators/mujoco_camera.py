@@ -5,16 +5,17 @@ from __future__ import annotations
 import math
 import os
 import sys
+import warnings
 import weakref
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from pushplan.drawing.palette import FLOOR_PALETTE
+from pushplan.envs.simulators.mujoco_library import mujoco, no_opengl
 from pushplan.envs.simulators.mujoco_shapes import rgba
-from pushplan.world import ClearanceArea, GoalDisc, GoalLine, MissingDependencyError, World
+from pushplan.world import ClearanceArea, GoalDisc, GoalLine, World
 from pushplan.world.checks import FloatArray, integer
 
 _ELEVATION = -58.0
@@ -136,21 +137,19 @@ class MujocoCamera:
 
 def _open(model: Any, width: int, height: int) -> tuple[Any, Any]:
     """An OpenGL context that draws into memory, and MuJoCo's renderer in it."""
-    try:
-        if os.environ.get("MUJOCO_GL") or not sys.platform.startswith("linux"):
-            context: Any = mujoco.GLContext(width, height)
-        else:
-            from mujoco.egl import GLContext
+    with warnings.catch_warnings(record=True) as said:  # GLFW warns of why there will be an error
+        try:
+            if os.environ.get("MUJOCO_GL") or not sys.platform.startswith("linux"):
+                context: Any = mujoco.GLContext(width, height)
+            else:
+                from mujoco.egl import GLContext
 
-            context = GLContext(width, height)
-        context.make_current()
-        renderer = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
-    except Exception as error:  # PyOpenGL and the drivers raise whatever they like
-        raise MissingDependencyError(
-            f"MuJoCo's camera found no OpenGL that draws without a display ({error}). Install EGL "
-            "(Debian: apt-get install libegl1 libgl1-mesa-dri), or OSMesa (libosmesa6) and set "
-            "the environment variable MUJOCO_GL=osmesa; render mode 'rgb_array' works without"
-        ) from error
+                context = GLContext(width, height)
+            context.make_current()
+            renderer = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
+        except Exception as error:  # PyOpenGL and the drivers raise whatever they like
+            cause = said[0].message if said else error
+            raise no_opengl(cause, "; render mode 'rgb_array' works without") from error
     return context, renderer
 
 

@@ -7,11 +7,11 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from pushplan.drawing.palette import FLOOR_PALETTE, WATER_PALETTE, Palette
 from pushplan.envs.simulators.base import Materials, Solids
+from pushplan.envs.simulators.mujoco_library import mujoco
 from pushplan.envs.simulators.mujoco_options import MujocoOptions
 from pushplan.envs.simulators.mujoco_shapes import (
     add_geom,

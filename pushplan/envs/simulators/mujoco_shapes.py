@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-import mujoco
 import numpy as np
 
+from pushplan.envs.simulators.mujoco_library import mujoco
 from pushplan.world.checks import FloatArray
 from pushplan.world.outline import centroid, signed_area
 

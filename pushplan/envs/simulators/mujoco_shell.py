@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import mujoco
 import numpy as np
 from shapely import MultiPoint, box, intersection
 
 from pushplan.drawing.palette import FLOOR_PALETTE
 from pushplan.envs.simulators.base import Solids
+from pushplan.envs.simulators.mujoco_library import mujoco
 from pushplan.envs.simulators.mujoco_shapes import add_geom, add_prism
 from pushplan.world import RobotModel
 from pushplan.world.checks import FloatArray

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -13,6 +12,7 @@ from pushplan.envs.simulators.base import Materials, Simulator, SimulatorState, 
 from pushplan.envs.simulators.mujoco_bodies import MujocoBodies, scene_key
 from pushplan.envs.simulators.mujoco_camera import MujocoCamera
 from pushplan.envs.simulators.mujoco_follow import follow_path
+from pushplan.envs.simulators.mujoco_library import mujoco
 from pushplan.envs.simulators.mujoco_options import MujocoOptions
 from pushplan.envs.trace import Trace
 from pushplan.interaction.interaction_model import Interaction

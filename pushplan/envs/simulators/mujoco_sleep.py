@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from pushplan.envs.simulators.mujoco_library import mujoco
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 from pushplan.world.outline import outward_normals, transform_outlines, unflatten
 

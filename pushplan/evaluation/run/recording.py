@@ -32,6 +32,7 @@ from pushplan.world import (
 )
 from pushplan.world.checks import FloatArray, number
 from pushplan.world.plan import Plan
+from pushplan.world.protocols import HasAttributes
 from pushplan.world.stored.recorded_plans import PlanRecorder
 
 Clock = Callable[[], float]
@@ -42,7 +43,7 @@ Observer = Callable[[int, World, Policy], None]
 
 
 @runtime_checkable
-class AdaptsActions(Protocol):
+class AdaptsActions(HasAttributes, Protocol):
     """An environment that can change to an action mode which takes velocities."""
 
     def take_velocities(self) -> bool:

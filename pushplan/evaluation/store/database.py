@@ -16,7 +16,7 @@ from typing import Any
 
 from pushplan.errors import describe, one_line, short
 from pushplan.evaluation.store.provenance import in_words
-from pushplan.evaluation.store.rows import ResultRow, checked_row, column_type, columns
+from pushplan.evaluation.store.rows import ResultRow, checked_row, column_type, columns, moment
 from pushplan.files.file_locks import is_locked
 from pushplan.files.safe_files import MAX_TEXT, parse_json
 from pushplan.world import InvalidInputError, PushplanError, SchemaError
@@ -322,6 +322,8 @@ def read_about(db: sqlite3.Connection) -> dict[str, Any]:
             if key == "runs":
                 known = isinstance(value, dict) and isinstance(value["packages"], dict)
                 known = known and bool(in_words(value))  # it reads all that others read
+                known = known and {type(value.get(name, 0)) for name in ("jobs", "done")} == {int}
+                moment(value["began"])
             elif key == "deadlines":
                 known = type(value) in (int, float) and math.isfinite(value)
             if not known:

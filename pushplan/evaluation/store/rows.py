@@ -38,6 +38,17 @@ def instant() -> str:
     return datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
+def moment(text: object) -> datetime:
+    """The time that `instant` wrote.
+
+    Raises:
+        ValueError: if it wrote no such text.
+    """
+    if not isinstance(text, str) or not _INSTANT.fullmatch(text):
+        raise ValueError(f"{short(text)} is no time as runs write it")
+    return datetime.fromisoformat(text)
+
+
 def csv_text(header: Sequence[str], lines: Iterable[Sequence[object]]) -> str:
     """Lines under a header; floats are written so that they read back the same."""
     buffer = io.StringIO()
@@ -163,8 +174,8 @@ class ResultRow:
 _ROUNDING = 1e-6
 _TEXT = re.compile(r"[^\x00-\x1f\x7f-\x9f\ud800-\udfff]{0,1000}")
 """Texts that may be shown on a terminal."""
+_INSTANT = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z", re.ASCII)
 _FORMS = {
-    "began": re.compile(r"(\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z)?"),
     # hashes that name files in a run directory
     "job": re.compile(r"[\w-]{0,64}", re.ASCII),
     "trace": re.compile("([0-9a-f]{32})?"),
@@ -256,6 +267,8 @@ def checked_row(row: ResultRow) -> ResultRow:
         if not _FORMS.get(name, _TEXT).fullmatch(text):
             raise ValueError(f"{name} is {text!r:.60}")
     Status(row.status)
+    if row.began:
+        moment(row.began)
     if type(row.success) is not bool or type(row.seed) is not int or abs(row.seed) >= 2**63:
         raise TypeError(f"success is {row.success!r:.60} and seed {row.seed!r:.60}")
     for name in (*_TIMES, "plan_calls"):

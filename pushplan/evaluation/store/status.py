@@ -9,7 +9,7 @@ from pathlib import Path
 
 from pushplan.errors import one_line
 from pushplan.evaluation.store.database import LOCK, read_about, reading
-from pushplan.evaluation.store.rows import Status
+from pushplan.evaluation.store.rows import Status, moment
 from pushplan.files.file_locks import is_locked
 from pushplan.world.checks import number
 
@@ -54,14 +54,15 @@ def run_status(path: str | Path, slowest: int = 3) -> RunStatus:
     active = is_locked(Path(path) / LOCK)
     with reading(path) as db:
         *_, call = read_about(db).get("runs", []) or [{}]
-        began = str(call.get("began", ""))
+        began = call.get("began", "")
         query = "SELECT count(*) FROM results WHERE status != ?"
         ((failed,),) = db.execute(query, (str(Status.DONE),))
         query = "SELECT count(*), max(began) FROM results WHERE began >= ?"
         ((new, last),) = db.execute(query, (began,))
         flying = db.execute("SELECT title, began FROM running ORDER BY began")
         running = tuple(
-            (one_line(str(title)), time.time() - number("began", start)) for title, start in flying
+            (one_line(str(title)), max(0.0, time.time() - number("began", start)))
+            for title, start in flying
         )
         took = db.execute(
             "SELECT policy || ' ' || scenario, wall_time_s FROM results "
@@ -71,14 +72,10 @@ def run_status(path: str | Path, slowest: int = 3) -> RunStatus:
         longest = tuple(
             (one_line(str(title)), number("wall_time_s", seconds)) for title, seconds in took
         )
-    end = datetime.now(UTC)
-    if last and not active:
-        end = datetime.fromisoformat(last)
-    elapsed = 0.0
-    if began:
-        elapsed = (end - datetime.fromisoformat(began)).total_seconds()
-    jobs = int(call.get("jobs", 0))
-    done = min(jobs, int(call.get("done", 0)) + new)
+        end = moment(last) if last and not active else datetime.now(UTC)
+        elapsed = (end - moment(began)).total_seconds() if began else 0.0
+    jobs = call.get("jobs", 0)
+    done = min(jobs, call.get("done", 0) + new)
     rate = new / elapsed if elapsed > 0.0 else 0.0
     return RunStatus(
         active=active,

@@ -13,10 +13,11 @@ from pushplan.planners.following.replanning import Comparison, Reason, rest_of
 from pushplan.planners.following.splicing import joined, passed
 from pushplan.world import InvalidInputError, PendingResult, Plan, Planner, PlanResult, Stop, World
 from pushplan.world.checks import expect
+from pushplan.world.protocols import HasAttributes
 
 
 @runtime_checkable
-class PreparedPlanner(Protocol):
+class PreparedPlanner(HasAttributes, Protocol):
     """A planner that makes what depends on the robot alone before its first call."""
 
     def prepare(self, world: World) -> None:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import logging
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pushplan.envs import PushEnv
+from pushplan.files.output_files import check_folder, make_folder, write_atomic
 from pushplan.files.safe_files import known_keys, read_data, read_npz
 from pushplan.imports.on_demand import need
 from pushplan.learned.builders import builder_from_dict, builder_to_dict
@@ -52,7 +53,8 @@ _KEYS = (
     *("format", "task", "simulator", "preset", "scenarios", "policy", "action_mode", "observation"),
     *("robot", "control_step", "total_episodes", "total_steps", "successes", "first_seed", "noise"),
 )
-_LATER_KEYS = ("driver", "hold")
+_COUNTS = ("total_episodes", "total_steps", "successes", "starts_done")
+_LATER_KEYS = ("driver", "hold", "starts", "afresh", "hindsight", "starts_done")
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,12 +86,15 @@ def record(
 ) -> Path:
     """Run a policy and write what it saw and wanted.
 
+    After each start the metadata say how far it is. If this is called again with the same arguments
+    and an unfinished data set, it goes on with the next start; the bytes are those of one call.
+
     Args:
         config: of a training that learns from it: task, observation, and scenarios, which the
             episodes take in turn.
         policy: whose actions are recorded.
         label: what the data set calls it.
-        folder: a new one.
+        folder: a new one, or that of a call with the same arguments.
         episodes: how many.
         first_seed: of the first layout; by default beyond all that scores are made on.
         noise: probability for each action that another one is carried out instead, for a few steps:
@@ -108,7 +113,7 @@ def record(
             actions lead there too (Andrychowicz et al. 2017, arXiv 1707.01495). Without rewards.
 
     Raises:
-        InvalidInputError: if the folder holds something, or a number makes no sense.
+        InvalidInputError: if the folder holds something else, or a number makes no sense.
     """
     integer("episodes", episodes, low=1)
     integer("first_seed", first_seed, low=0)
@@ -116,8 +121,7 @@ def record(
     integer("hold", hold, low=1)
     integer("hindsight", hindsight, low=0)
     folder = Path(folder)
-    if folder.exists() and any(folder.iterdir()):
-        raise InvalidInputError(f"{folder} is not empty")
+    check_folder(folder, "data set", METADATA)
     builder = builder_from_dict(config.observation)
     wanted = "state"
     if isinstance(policy, ChoosesObservation):
@@ -130,21 +134,6 @@ def record(
                     "a data set with observations of a lidar is made in scenarios without sensing: "
                     f"the scans are made of the scene; got sensing {sensing!r}"
                 )
-    (folder / "data").mkdir(parents=True, exist_ok=True)
-    steps = successes = count = 0
-    for index in range(episodes):
-        env = envs[index % len(envs)]
-        seed = first_seed + index
-        for part in _run(env, policy, driver, noise, hold, seed, afresh):
-            successes += part.success
-            rng = stream(seed, f"hindsight {len(part.rows)}")
-            for each in (part, *(part.hindsight(rng) for _ in range(hindsight))):
-                if each is not None:
-                    arrays = each.arrays(builder)
-                    np.savez_compressed(folder / "data" / f"episode_{count:05d}.npz", **arrays)
-                    count += 1
-                    steps += len(each.rows)
-        log.info("%d of %d starts: %d steps, %d successes", index + 1, episodes, steps, successes)
     env = envs[0]
     about = {
         "format": SCHEMA,
@@ -157,18 +146,60 @@ def record(
         "observation": builder_to_dict(builder),
         "robot": vars(RobotSpec.of(env.task.robot)),
         "control_step": env.task.control_step,
-        "total_episodes": count,
-        "total_steps": steps,
-        "successes": successes,
         "first_seed": first_seed,
         "noise": noise,
         "hold": hold,
         "driver": driver_label,
+        "starts": episodes,
+        "afresh": afresh,
+        "hindsight": hindsight,
     }
-    (folder / METADATA).write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
+    counts = _counts(folder, about)
+    folder.mkdir(parents=True, exist_ok=True)
+    _write(folder, about, counts)  # the mark of a data set comes first
+    make_folder(folder / "data")
+    for index in range(counts["starts_done"], episodes):
+        env = envs[index % len(envs)]
+        seed = first_seed + index
+        for part in _run(env, policy, driver, noise, hold, seed, afresh):
+            counts["successes"] += part.success
+            rng = stream(seed, f"hindsight {len(part.rows)}")
+            for each in (part, *(part.hindsight(rng) for _ in range(hindsight))):
+                if each is not None:
+                    path = folder / "data" / f"episode_{counts['total_episodes']:05d}.npz"
+                    np.savez_compressed(path, **each.arrays(builder))
+                    counts["total_episodes"] += 1
+                    counts["total_steps"] += len(each.rows)
+        counts["starts_done"] += 1
+        _write(folder, about, counts)
     for env in envs:
         env.close()
     return folder
+
+
+def _write(folder: Path, about: Mapping[str, Any], counts: Mapping[str, int]) -> None:
+    text = json.dumps({**about, **counts}, indent=2) + "\n"
+    write_atomic(folder / METADATA, text.encode())
+    said = (counts["starts_done"], about["starts"], counts["total_steps"], counts["successes"])
+    log.info("%d of %d starts: %d steps, %d successes", *said)
+
+
+def _counts(folder: Path, about: Mapping[str, Any]) -> dict[str, int]:
+    """Return the counts of a data set of this description, by key of its metadata.
+
+    Raises:
+        InvalidInputError: if the folder holds one of another description.
+    """
+    if not (folder / METADATA).exists():
+        return dict.fromkeys(_COUNTS, 0)
+    there = _stored(folder)
+    asked = json.loads(json.dumps(about))  # as values come back from a file
+    if other := [key for key in asked if there.get(key) != asked[key]]:
+        raise InvalidInputError(
+            f"{folder} holds a data set with another {', '.join(other)}: ask for the same, or "
+            "choose a new folder; nothing in this one was changed"
+        )
+    return {key: integer(key, there.get(key), low=0) for key in _COUNTS}
 
 
 class _Part(NamedTuple):
@@ -252,10 +283,20 @@ def read_metadata(folder: str | Path) -> dict[str, Any]:
     """Read the metadata of a data set.
 
     Raises:
-        SchemaError: if the folder holds no data set.
+        SchemaError: if the folder holds no data set, or an unfinished one.
     """
-    path = Path(folder) / METADATA
-    data = read_data(path, "data set")
+    data = _stored(folder)
+    if data.get("starts_done") != data.get("starts"):
+        raise SchemaError(
+            f"{folder} holds a data set of which {data.get('starts_done')} of {data.get('starts')} "
+            "starts are done: the command that began it goes on with the others"
+        )
+    return data
+
+
+def _stored(folder: str | Path) -> dict[str, Any]:
+    """Read the metadata of a data set, finished or not."""
+    data = read_data(Path(folder) / METADATA, "data set")
     if not isinstance(data, dict) or data.get("format") != SCHEMA:
         raise SchemaError(f"{folder} is no data set of format {SCHEMA!r}")
     known_keys("the metadata of a data set", data, (*_KEYS, *_LATER_KEYS), _KEYS)

@@ -26,7 +26,7 @@ from pushplan.world.static_map import StaticMap
 _DEPTH = re.compile(rb"P[25](?:\s+(?:#.*\s+)*\d+){2}\s+(?:#.*\s+)*(\d+)")
 """Greatest value of a grey map in PGM."""
 _MODES = ("trinary", "scale", "raw")
-_FORMATS = ("PPM", "PNG", "BMP")
+_FORMATS = ("PPM", "PNG", "BMP", "JPEG")
 _MAX_PIXELS = 4096**2
 _TO_16_BITS = 257
 """Factor from a value of 8 bits to one of 16: 65535 / 255."""
@@ -39,7 +39,7 @@ def load_nav2_map(path: str | Path, *, unknown: str = "obstacle", occupied: int 
     """Read a map as ``nav2_map_server`` does, from its YAML file.
 
     Args:
-        path: the YAML file, which names a picture (PGM, PNG, BMP) beside it.
+        path: the YAML file, which names a picture (PGM, PNG, BMP, JPEG) beside it.
         unknown: "obstacle" or "free", what unknown cells count as.
         occupied: cells from this value on are obstacles [%]; in maps of mode ``trinary`` a cell is
             0, 100 or unknown.
@@ -119,9 +119,10 @@ def _picture(path: Path) -> tuple[IntArray, BoolArray]:
                 raise ValueError(f"{image.width} x {image.height} pixels, {_MAX_PIXELS:,} are most")
             grey, opaque = _pixels(image)
     except Exception as error:  # a decoder of pictures raises errors of many kinds
-        raise SchemaError(
-            f"cannot read the picture of the map, {path}: {describe(error)}"
-        ) from error
+        why = describe(error)
+        if isinstance(error, Image.UnidentifiedImageError):
+            why = "it is no whole picture in PGM, PNG, BMP or JPEG"
+        raise SchemaError(f"cannot read the picture of the map, {path}: {why}") from error
     depth = _DEPTH.match(data)
     if depth is not None and 0 < int(depth[1]) < 255:  # Pillow rounds to the nearest
         most = int(depth[1])
