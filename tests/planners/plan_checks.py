@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from pushplan.world import Drive, Plan, PlanStatus, World
+from pushplan.world import Drive, GoalPose, Plan, PlanStatus, World
 from pushplan.world.outline import transform
 
 FRACTIONS = np.array([0.0, 0.25, 0.5, 0.75])
@@ -21,16 +21,26 @@ def check_plan(world: World, plan: Plan, status: PlanStatus) -> None:
     if status is not PlanStatus.APPROXIMATE:
         x, y = plan.poses[-1, :2].tolist()
         assert world.goal.distance(x, y) <= 1e-6 * size + rounding, "goal"
+    if plan.object_poses is not None:
+        assert np.array_equal(plan.object_poses[0], world.movables.poses), "objects"
+    if status is PlanStatus.SOLVED and isinstance(world.goal, GoalPose):
+        off = _turn(plan.poses[-1, 2] - world.goal.heading)
+        assert abs(off) <= world.goal.heading_tolerance + 1e-9, f"goal heading {off}"
     if status is not PlanStatus.PATH_ONLY:
         _check_motion(world, plan, rounding)
         _check_walls(world, plan, rounding)
+
+
+def _turn(angle: float) -> float:
+    """The same turn within half a turn to either side [rad]."""
+    return float(np.remainder(angle + np.pi, 2.0 * np.pi) - np.pi)
 
 
 def _check_motion(world: World, plan: Plan, rounding: float) -> None:
     """Starts at the robot's heading, drives as it can, and keeps every limit of the robot."""
     robot, moved, steps = world.robot, np.diff(plan.poses, axis=0), np.diff(plan.times)
     size = robot.circumscribed_radius
-    off = np.remainder(plan.poses[0, 2] - world.robot_pose[2] + np.pi, 2.0 * np.pi) - np.pi
+    off = _turn(plan.poses[0, 2] - world.robot_pose[2])
     assert abs(off) <= 1e-9, f"heading {off}"
     turns = np.abs(moved[:, 2])
     most = 1e-6 + rounding / size
