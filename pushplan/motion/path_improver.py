@@ -13,7 +13,7 @@ from pushplan.core import motion as core
 from pushplan.interaction import InteractionModel
 from pushplan.interaction.compiled_model import SweptModel, compile_interaction
 from pushplan.motion.collision import footprint, obstacles
-from pushplan.motion.goal_approach import behind, path_end, run_up
+from pushplan.motion.goal_approach import behind, fitting, path_end, run_up
 from pushplan.motion.goal_region import goal_numbers
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_search_config import (
@@ -85,8 +85,12 @@ class PathImprover:
         self.given = world  # with its own goal
         self.pose_goal = world.goal if isinstance(world.goal, GoalPose) else None
         """A goal with a heading; searches of `world` lead to where the end of a path begins."""
+        self._fits = True
         self._straight = 0.0
         if self.pose_goal is not None:
+            fitted = fitting(world, self.pose_goal)
+            self._fits = fitted is not None
+            self.pose_goal = fitted or self.pose_goal
             self._straight = run_up(world, self.pose_goal, turning_radius)
             near = self.pose_goal.radius
             if self._straight:
@@ -137,11 +141,11 @@ class PathImprover:
         margin = start_margin(self.world, self.config.margin * self.size)
         if margin is None:
             return PlanStatus.START_BLOCKED
-        if goal_is_outside(self.given):
+        if goal_is_outside(self.given) or not self._fits:
             return PlanStatus.GOAL_UNREACHABLE
         goal = self.pose_goal
-        if goal is not None and (margin := start_margin(self.world, margin, goal.pose)) is None:
-            return PlanStatus.GOAL_UNREACHABLE
+        if goal is not None:
+            margin = start_margin(self.world, margin, goal.pose) or 0.0
         self._set_margin(margin)
         if self.given.goal_reached:
             here = make_swept_path(1, len(self.world.movables))

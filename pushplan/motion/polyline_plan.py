@@ -10,7 +10,7 @@ import numpy as np
 from pushplan.core import motion as core
 from pushplan.geometry.angles import wrap_angle
 from pushplan.motion.collision import footprint, obstacles
-from pushplan.motion.goal_approach import path_end, run_up
+from pushplan.motion.goal_approach import fitting, path_end, run_up
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.speed_profile import along_arcs, turning_radius
 from pushplan.world import GoalPose, NavigationGoal, Plan, PlanResult, PlanStatus, World
@@ -125,7 +125,7 @@ def polyline_result(
     plan = polyline_plan(world, points, spacing)
     goal = world.navigation_goal
     if isinstance(goal, GoalPose) and not goal.reached_by(plan.poses[-1]):
-        plan = _ended_at(world, goal, plan, spacing) or plan
+        plan = _ended_at(world, fitting(world, goal) or goal, plan, spacing) or plan
     first = call.elapsed if _arrives(world, plan.poses[-1]) else math.nan
     return call.result(polyline_status(world, plan), plan, first, iterations)
 
