@@ -135,6 +135,8 @@ class PathImprover:
         self._shortcut_pace = Pace()
         self._sweep_pace = Pace()
         self.best: SweptPath | None = None
+        self.spare: PathImprover | None = None
+        """Has a path that is the plan if no other one is found."""
 
     def begin(self) -> PlanStatus | None:
         """Find the margin that can be kept; a status where the call ends here already."""
@@ -446,6 +448,14 @@ class PathImprover:
         self.best = SweptPath(*(part[:count] for part in path))
         if copied:
             self.best = SweptPath(*(part.copy() for part in self.best))
+
+    def falls_back(self) -> bool:
+        """Take up the spare path where there is no plan; True if there is one then."""
+        if self.spare is not None and self.spare.best is not None and not self.solved:
+            self.best = self.spare.best
+            self.best_cost = self.spare.best_cost
+            self.first_solution_s = self.spare.first_solution_s
+        return self.solved
 
     def result(self, status: PlanStatus, **detail: float) -> PlanResult:
         """The result of the call: the best path so far as a plan, where the status has one."""
