@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import shapely
+from numpy.typing import ArrayLike
 
 from pushplan.errors import InvalidInputError, SchemaError, short
 from pushplan.files.safe_files import known_keys, read_data
@@ -118,6 +119,9 @@ def load_relopush(
 ) -> World:
     """One instance of a file of ReloPush (Ahn and Mavrogiannis, arXiv 2409.18231).
 
+    The workspace of ReloPush bounds the origin of the robot. We add walls around it; where a block
+    or a place reaches over a side, that wall is farther out, so that the robot gets there.
+
     Args:
         path: a JSON list of instances: ``objects`` and ``goals`` [x, y, theta], the ``robot``'s
             pose, and ``raw_other.assign``, pairs of an object and a goal.
@@ -162,7 +166,11 @@ def load_relopush(
         np.full(count, 4),
     )
     movables = Movables.from_outlines([box] * len(starts), starts, density=_DENSITY)
-    return World(robot, pose, _room(np.zeros(2), np.array(RELOPUSH_ROOM)), movables, goal)
+    corners = np.concatenate([transform(at, box) for at in (*starts, *ends)])
+    low = corners.min(axis=0) < 0.0
+    high = corners.max(axis=0) > RELOPUSH_ROOM
+    outside = robot.circumscribed_radius * np.array([low, high])
+    return World(robot, pose, _room(np.zeros(2), np.array(RELOPUSH_ROOM), outside), movables, goal)
 
 
 def _outline(shape: str) -> list[FloatArray]:
@@ -180,9 +188,10 @@ def _rectangle(x0: float, y0: float, x1: float, y1: float) -> FloatArray:
     return np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
 
 
-def _room(low: FloatArray, high: FloatArray) -> StaticMap:
-    x0, y0 = low.tolist()
-    x1, y1 = high.tolist()
+def _room(low: FloatArray, high: FloatArray, outside: ArrayLike = 0.0) -> StaticMap:
+    """Bounds, and walls around them: (2, 2) how far outside of the low and the high ones [m]."""
+    bounds = np.concatenate([low, high])
+    x0, y0, x1, y1 = (bounds + np.ravel(outside * np.array([[-1.0], [1.0]]))).tolist()
     t = _WALL
     walls = [
         _rectangle(x0 - t, y0 - t, x1 + t, y0),
@@ -190,7 +199,7 @@ def _room(low: FloatArray, high: FloatArray) -> StaticMap:
         _rectangle(x0 - t, y0, x0, y1),
         _rectangle(x1, y0, x1 + t, y1),
     ]
-    return StaticMap.build(walls, bounds=(x0, y0, x1, y1))
+    return StaticMap.build(walls, bounds=bounds)
 
 
 def _spread_out(
