@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike
 
 from pushplan.errors import InvalidInputError, SchemaError, short
 from pushplan.files.safe_files import known_keys, read_data
@@ -20,6 +19,7 @@ ARRANGEMENTS = ("random", "swapped")
 SHAPES = ("box", "t")
 
 _WALL = 0.1  # thickness [m]
+_AT_BOUNDS = np.zeros((2, 2))  # of walls that are not outside
 _SIDES = {"box": 0.1, "t": 0.05}  # of a box, and of the squares that a T is made of [m]
 _DENSITY = 10.0  # of the objects [kg/m²]
 _FREE = 1.2  # distance of places from the walls [diameters of the robot] and half a side
@@ -188,10 +188,11 @@ def _rectangle(x0: float, y0: float, x1: float, y1: float) -> FloatArray:
     return np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
 
 
-def _room(low: FloatArray, high: FloatArray, outside: ArrayLike = 0.0) -> StaticMap:
-    """Bounds, and walls around them: (2, 2) how far outside of the low and the high ones [m]."""
-    bounds = np.concatenate([low, high])
-    x0, y0, x1, y1 = (bounds + np.ravel(outside * np.array([[-1.0], [1.0]]))).tolist()
+def _room(low: FloatArray, high: FloatArray, outside: FloatArray = _AT_BOUNDS) -> StaticMap:
+    """Bounds, and walls (2, 2) so far outside of the low and the high ones [m]."""
+    below, beyond = outside
+    x0, y0 = (low - below).tolist()
+    x1, y1 = (high + beyond).tolist()
     t = _WALL
     walls = [
         _rectangle(x0 - t, y0 - t, x1 + t, y0),
@@ -199,7 +200,7 @@ def _room(low: FloatArray, high: FloatArray, outside: ArrayLike = 0.0) -> Static
         _rectangle(x0 - t, y0, x0, y1),
         _rectangle(x1, y0, x1 + t, y1),
     ]
-    return StaticMap.build(walls, bounds=bounds)
+    return StaticMap.build(walls, bounds=(*low, *high))
 
 
 def _spread_out(
