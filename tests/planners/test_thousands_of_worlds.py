@@ -154,3 +154,13 @@ def test_a_path_of_ones_own_that_ends_short_of_the_goal_is_approximate() -> None
     arrive = {key for key, status in ends.items() if status is PlanStatus.SOLVED}
     assert arrive == {("disc", "place"), ("ahead", "place")}
     assert {ends[key] for key in ends.keys() - arrive} == {PlanStatus.APPROXIMATE}
+
+
+@pytest.mark.parametrize("seed", [12, 19, 167, 713, 1285])
+def test_a_ship_has_a_way_where_another_planner_knows_one(seed: int) -> None:
+    """The tightest turn fits to neither side, or the beam ends before the line."""
+    world = random_world(seed, "ship-predictive")
+    result = make_planner("ship-predictive").plan(world)
+    assert result.status is PlanStatus.SOLVED
+    assert result.plan is not None
+    check_plan(world, result.plan, result.status)
