@@ -36,7 +36,8 @@ def test_overlaps_are_named_with_their_depths(tmp_path):
     assert "object 2 and something static by 0.1 m" in said
     assert "object 0 and object 1 by 0.05 m" in said
     assert "more" not in said
-    assert started(tmp_path, POSES + [[0, 0, 0], [0.1, 0, 0], [0, -0.3, 0], [0, 1, 0], [0, 0, 0]]) == []
+    shifts = np.array([[0, 0, 0], [0.1, 0, 0], [0, -0.3, 0], [0, 1, 0], [0, 0, 0]])
+    assert started(tmp_path, POSES + shifts) == []
 
 
 def test_objects_that_are_fixed_may_be_part_of_a_wall(tmp_path):

@@ -260,7 +260,9 @@ def _shapes(rng: Rng, count: int) -> Movables:
         [[ANGLE * size], [size * part for part in CROSS], [SQUARE * size]][kind]
         for kind, size in zip(kinds, sizes, strict=True)
     ]
-    objects = Movables.from_polygons([[part + [3 * k, 0] for part in s] for k, s in enumerate(shapes)])
+    objects = Movables.from_polygons(
+        [[part + np.array([3 * k, 0]) for part in s] for k, s in enumerate(shapes)]
+    )
     return objects.moved_to(poses.reshape(-1, 3))
 
 

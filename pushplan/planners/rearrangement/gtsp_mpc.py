@@ -64,7 +64,7 @@ class GtspMpc(RearrangementPolicy):
         overrides: fields of the default config to change, in place of ``config``.
 
     With a goal of `ObjectGoals` objects are brought to places of their own (docs/gtsp-mpc.md). Of
-    the settings ``grip``, ``mpc``, ``order``, ``response`` and the noise count then; ``graph`` stays
+    the settings ``grip``, ``mpc``, ``order``, ``response`` and the noise count then; ``graph`` is
     empty.
 
     Attributes:
