@@ -177,29 +177,36 @@ def _outline(shape: str) -> list[FloatArray]:
     """Convex parts about the centroid of all."""
     side = _SIDES[shape]
     if shape == "box":
-        return [_rectangle(-0.5 * side, -0.5 * side, 0.5 * side, 0.5 * side)]
-    bar = _rectangle(-2.0 * side, 0.0, 2.0 * side, side)
-    stem = _rectangle(-0.5 * side, -3.0 * side, 0.5 * side, 0.0)
+        return [rectangle(-0.5 * side, -0.5 * side, 0.5 * side, 0.5 * side)]
+    bar = rectangle(-2.0 * side, 0.0, 2.0 * side, side)
+    stem = rectangle(-0.5 * side, -3.0 * side, 0.5 * side, 0.0)
     middle = np.array([0.0, (4.0 * 0.5 - 3.0 * 1.5) / 7.0 * side])  # areas of 4 and 3 squares
     return [bar - middle, stem - middle]
 
 
-def _rectangle(x0: float, y0: float, x1: float, y1: float) -> FloatArray:
+def rectangle(x0: float, y0: float, x1: float, y1: float) -> FloatArray:
+    """(4, 2) corners [m] of an upright rectangle, counter-clockwise."""
     return np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+
+
+def walls_around(
+    bounds: tuple[float, float, float, float], thickness: float
+) -> tuple[FloatArray, ...]:
+    """Four walls, each (4, 2) corners [m], around a room x_min, y_min, x_max, y_max [m]."""
+    x0, y0, x1, y1 = bounds
+    t = thickness
+    return (
+        rectangle(x0 - t, y0 - t, x1 + t, y0),
+        rectangle(x0 - t, y1, x1 + t, y1 + t),
+        rectangle(x0 - t, y0, x0, y1),
+        rectangle(x1, y0, x1 + t, y1),
+    )
 
 
 def _room(low: FloatArray, high: FloatArray, outside: FloatArray = _AT_BOUNDS) -> StaticMap:
     """Bounds, and walls (2, 2) so far outside of the low and the high ones [m]."""
     below, beyond = outside
-    x0, y0 = (low - below).tolist()
-    x1, y1 = (high + beyond).tolist()
-    t = _WALL
-    walls = [
-        _rectangle(x0 - t, y0 - t, x1 + t, y0),
-        _rectangle(x0 - t, y1, x1 + t, y1 + t),
-        _rectangle(x0 - t, y0, x0, y1),
-        _rectangle(x1, y0, x1 + t, y1),
-    ]
+    walls = walls_around((*(low - below).tolist(), *(high + beyond).tolist()), _WALL)
     return StaticMap.build(walls, bounds=(*low, *high))
 
 
