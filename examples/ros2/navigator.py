@@ -168,7 +168,12 @@ class Navigator:
         except InvalidInputError as error:  # not a planner for such a robot or goal
             raise NavigationError("INVALID_PLANNER", str(error)) from error
         status = result.status
-        if result.plan is None or status is PlanStatus.APPROXIMATE:
+        turned = (
+            result.plan is not None
+            and isinstance(end, GoalPose)
+            and abs(end.heading_error(result.plan.poses[-1, 2])) > end.heading_tolerance
+        )
+        if result.plan is None or turned or status is PlanStatus.APPROXIMATE:
             code = _CODES.get(status, "NO_VALID_PATH")
             if status is PlanStatus.GOAL_UNREACHABLE and _is_occupied(world, end.center):
                 code = "GOAL_OCCUPIED"

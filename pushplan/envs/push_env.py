@@ -18,6 +18,7 @@ from pushplan.envs.action_modes import ActionMode, Motion, chosen_action, waitin
 from pushplan.envs.registry import ACTIONS, SIMULATORS, default_preset, task_class
 from pushplan.envs.rendering import Renderer
 from pushplan.envs.simulators.base import Simulator
+from pushplan.envs.start_checks import check_start
 from pushplan.envs.tasks.base import StepOutcome, Task
 from pushplan.envs.trace import Trace
 from pushplan.imports.on_demand import look_up, need
@@ -212,7 +213,7 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[Any], dict[str, Any]]:
-        """Start an episode.
+        """Start an episode; warns of bodies that overlap, see `pushplan.envs.start_checks`.
 
         Args:
             seed: decides the start, alone; without it the next start of the sequence that the
@@ -233,6 +234,7 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         world = self.task.start(stream(layout, "layout"))
         flat = not self._simulator.needs_solids
         world, materials = self.task.varied(world, stream(layout, "parameters"), flat=flat)
+        check_start(world, overlaps=self.task.may_overlap)
         self._simulator.build(world, materials)
         self._world = world
         self._meanwhile = clamp_twist(world.robot, 0.0, 0.0)

@@ -6,10 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 
+from pushplan.geometry.convex import convex_penetration
 from pushplan.geometry.shortest_path import goal_distances
-from pushplan.world import AreaGoal, GoalDisc, ManipulationGoal, ObjectGoals, StaticMap
+from pushplan.world import AreaGoal, GoalDisc, ManipulationGoal, ObjectGoals, StaticMap, World
 from pushplan.world.checks import FloatArray, IntArray
 from pushplan.world.goals import least_pairing
+from pushplan.world.outline import transform
 
 Ways = Callable[[AreaGoal | GoalDisc, FloatArray], FloatArray]
 """From an area or a disc, and (N, 2) points [m], to the (N,) ways from them [m], inf for none."""
@@ -48,4 +50,33 @@ def shared_ways(
         k = np.flatnonzero(np.isin(ids, goal.ids[own]))
         lengths = np.column_stack([ways(goal.places[g], places[k]) for g in own.tolist()])
         found[k] = lengths[np.arange(len(k)), least_pairing(lengths)]
+    return found
+
+
+def blocked_places(world: World) -> dict[int, float]:
+    """By id, how deep the place of an object is in something static [m], if that keeps it out.
+
+    Objects that fit somewhere within the tolerances of their places are left out, and all of them
+    where the goal is not one of `ObjectGoals`.
+    """
+    found: dict[int, float] = {}
+    goal, objects, static = world.goal, world.movables, world.static
+    if not isinstance(goal, ObjectGoals):
+        return found
+    for k, place in enumerate(goal.assigned(objects.ids, objects.poses).tolist()):
+        if place < 0:
+            continue
+        pose = goal.poses[place]
+        reach = objects.radii[k] * np.array([-1.0, -1.0, 1.0, 1.0])
+        box = np.tile(pose[:2], 2) + reach
+        near = ((static.boxes[:, :2] < box[2:]) & (static.boxes[:, 2:] > box[:2])).all(axis=1)
+        depths = [
+            convex_penetration(static.convex_parts[wall], transform(pose, part))[0]
+            for wall in np.flatnonzero(near)
+            for part in objects.parts(k)
+        ]
+        deepest = max(depths, default=0.0)
+        # no point of the object moves farther within the tolerances
+        if deepest > goal.radii[place] + objects.radii[k] * goal.heading_tolerances[place]:
+            found[int(objects.ids[k])] = deepest
     return found

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import threading
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from pushplan.core import motion as core
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.time_slicing import never
 from pushplan.search.grid_dijkstra import grid_dijkstra
-from pushplan.world import GoalDisc, StaticMap, World
+from pushplan.world import GoalDisc, GoalLine, NavigationGoal, StaticMap, World
 from pushplan.world.checks import FloatArray, frozen
 from pushplan.world.outline import flatten, outline_boxes
 
@@ -73,6 +74,12 @@ def reachable(world: World, stopped: Callable[[], bool] = never) -> bool:
         return True  # too coarse to tell
     # a cell less than the disc: a narrow gap is left for the search to find out about
     extra = _wall_weights(keep_out(world), cell, ((inner - cell, np.inf),)).make(stopped)
+    goal: NavigationGoal = world.navigation_goal  # grown by a cell: its rim may be reached alone
+    if isinstance(goal, GoalDisc):
+        goal = GoalDisc(goal.center, goal.radius + cell)
+    else:
+        goal = GoalLine(goal.point - cell * goal.normal, goal.normal)
+    world = replace(world, goal=goal)
     return extra is None or len(_cheapest(world, extra, cell, stopped)) > 0
 
 

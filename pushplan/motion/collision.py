@@ -19,13 +19,17 @@ GROUP = 16
 
 @functools.lru_cache(maxsize=64)
 def footprint(robot: RobotModel, margin: float = 0.0) -> core.Footprint:
-    """Return the robot's parts that count at walls, grown by ``margin`` [m] with sharp corners."""
+    """Return the robot's parts that count at walls, grown by ``margin`` [m] with sharp corners.
+
+    A negative margin makes them smaller; those of which nothing is left are left out.
+    """
     parts = list(robot.wall_parts)
     if margin != 0.0:
         grown = [Polygon(part).buffer(margin, join_style="mitre").exterior for part in parts]
-        parts = [convex_outline("footprint", np.asarray(ring.coords)[:-1]) for ring in grown]
+        rings = [np.asarray(ring.coords)[:-1] for ring in grown if not ring.is_empty]
+        parts = [convex_outline("footprint", ring) for ring in rings]
     vertices, offsets = flatten(parts)
-    radius = float(np.hypot(vertices[:, 0], vertices[:, 1]).max())
+    radius = float(np.hypot(vertices[:, 0], vertices[:, 1]).max(initial=0.0))
     return core.Footprint(vertices, offsets, radius)
 
 

@@ -7,12 +7,16 @@ Reeds and Shepp 1990 for cars that may reverse).
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from pushplan.core import motion as core
 from pushplan.geometry import VisibilityGraph
+from pushplan.interaction import QuasiStatic
+from pushplan.interaction.compiled_model import compile_interaction
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_improver import PathImprover
 from pushplan.motion.path_search_config import EDGE, INSET
@@ -28,6 +32,7 @@ _SHARP = 0.8
 """Turn beyond which a bend is driven through its ends, not only through its middle [rad]."""
 _WIDE = 1.25  # clearance of the first path [circumscribed radii]
 _BEYOND_RADIUS = 1.02  # the same at least, so that curves around corners fit [turning radii]
+_PATIENCE = 20  # times the usual rounds of the contact solver
 _NARROW = 1.1  # clearance of the second path, where the first leads nowhere [circumscribed radii]
 
 
@@ -48,6 +53,21 @@ def along_guide(improver: PathImprover, *, around: bool = False) -> bool:
         True if that is a path without a jam.
     """
     return any(is_way(improver, vias) for vias in guides(improver, around=around))
+
+
+def set_aside_drive(improver: PathImprover) -> None:
+    """Set aside a drive along the shortest path through all objects, for want of another plan.
+
+    The contact solver gets so many rounds that what it leaves of an overlap is held by a wall: in a
+    crowd, or where objects overlap at the start, its usual rounds end before they are apart.
+    """
+    model = improver.interaction
+    if isinstance(model, QuasiStatic):
+        patient = replace(model, iterations=_PATIENCE * model.iterations)
+        other = copy.copy(improver)
+        other.contacts = compile_interaction(patient, improver.world)
+        if along_guide(other):
+            improver.spare = other
 
 
 def is_way(improver: PathImprover, vias: FloatArray) -> bool:

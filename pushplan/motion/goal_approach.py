@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,9 @@ from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.keep_out import keep_out
 from pushplan.world import GoalPose, RobotModel, World
 from pushplan.world.checks import FloatArray
+
+_MOST_BOXES = 500  # of poses at a goal that are looked at
+_WITHIN = 0.9  # of the tolerances is used
 
 
 class PathEnd(NamedTuple):
@@ -53,6 +57,49 @@ def path_end(
     poses = np.ascontiguousarray(path)
     end = PathEnd(*core.path_end(_numbers(goal), poses, turns, straight, checker))
     return end if end.kept else None
+
+
+def fitting(world: World, goal: GoalPose) -> GoalPose | None:
+    """The goal, or where the robot does not fit in its middle, tolerances around where it does.
+
+    Boxes of poses are halved, beginning with that of all tolerances, until the robot fits in the
+    middle of one. A box is left out if what is left of the footprint after every motion within it
+    touches something static in the middle.
+
+    Returns:
+        None if the robot fits nowhere in the goal; the goal itself where that is not known.
+    """
+    robot = world.robot
+    static = keep_out(world)
+    walls = obstacles(static)
+    checker = core.CollisionChecker(footprint(robot), walls)
+    boxes = deque([(np.zeros(3), goal.radius, goal.heading_tolerance)])
+    for _ in range(_MOST_BOXES):
+        if not boxes:
+            return None
+        off, half, turn = boxes.popleft()
+        pose = goal.pose + off
+        away = float(np.hypot(off[0], off[1]))
+        aside = abs(float(off[2]))
+        within = max(away / goal.radius, aside / goal.heading_tolerance)
+        if within <= _WITHIN and checker.is_free(pose):
+            left = goal.radius - away, pose[2], goal.heading_tolerance - aside
+            return GoalPose(pose[:2], *left) if within else goal
+        reach = math.sqrt(2.0) * half
+        inside = np.append(np.clip(pose[:2], static.bounds[:2], static.bounds[2:]), pose[2])
+        if max(math.dist(inside, pose), away - goal.radius) > reach:
+            continue
+        least = footprint(robot, -reach - robot.circumscribed_radius * turn)
+        if not core.CollisionChecker(least, walls).is_free(inside):
+            continue
+        if reach > robot.circumscribed_radius * turn:
+            half = 0.5 * half
+            steps = [(x, y, 0.0) for x in (-half, half) for y in (-half, half)]
+        else:
+            turn = 0.5 * turn
+            steps = [(0.0, 0.0, -turn), (0.0, 0.0, turn)]
+        boxes.extend((off + np.array(step), half, turn) for step in steps)
+    return goal
 
 
 def run_up(world: World, goal: GoalPose, radius: float) -> float:

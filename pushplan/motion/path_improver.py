@@ -13,7 +13,7 @@ from pushplan.core import motion as core
 from pushplan.interaction import InteractionModel
 from pushplan.interaction.compiled_model import SweptModel, compile_interaction
 from pushplan.motion.collision import footprint, obstacles
-from pushplan.motion.goal_approach import behind, path_end, run_up
+from pushplan.motion.goal_approach import behind, fitting, path_end, run_up
 from pushplan.motion.goal_region import goal_numbers
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_search_config import (
@@ -85,8 +85,12 @@ class PathImprover:
         self.given = world  # with its own goal
         self.pose_goal = world.goal if isinstance(world.goal, GoalPose) else None
         """A goal with a heading; searches of `world` lead to where the end of a path begins."""
+        self._fits = True
         self._straight = 0.0
         if self.pose_goal is not None:
+            fitted = fitting(world, self.pose_goal)
+            self._fits = fitted is not None
+            self.pose_goal = fitted or self.pose_goal
             self._straight = run_up(world, self.pose_goal, turning_radius)
             near = self.pose_goal.radius
             if self._straight:
@@ -131,17 +135,19 @@ class PathImprover:
         self._shortcut_pace = Pace()
         self._sweep_pace = Pace()
         self.best: SweptPath | None = None
+        self.spare: PathImprover | None = None
+        """Has a path that is the plan if no other one is found."""
 
     def begin(self) -> PlanStatus | None:
         """Find the margin that can be kept; a status where the call ends here already."""
         margin = start_margin(self.world, self.config.margin * self.size)
         if margin is None:
             return PlanStatus.START_BLOCKED
-        if goal_is_outside(self.given):
+        if goal_is_outside(self.given) or not self._fits:
             return PlanStatus.GOAL_UNREACHABLE
         goal = self.pose_goal
-        if goal is not None and (margin := start_margin(self.world, margin, goal.pose)) is None:
-            return PlanStatus.GOAL_UNREACHABLE
+        if goal is not None:
+            margin = start_margin(self.world, margin, goal.pose) or 0.0
         self._set_margin(margin)
         if self.given.goal_reached:
             here = make_swept_path(1, len(self.world.movables))
@@ -442,6 +448,14 @@ class PathImprover:
         self.best = SweptPath(*(part[:count] for part in path))
         if copied:
             self.best = SweptPath(*(part.copy() for part in self.best))
+
+    def falls_back(self) -> bool:
+        """Take up the spare path where there is no plan; True if there is one then."""
+        if self.spare is not None and self.spare.best is not None and not self.solved:
+            self.best = self.spare.best
+            self.best_cost = self.spare.best_cost
+            self.first_solution_s = self.spare.first_solution_s
+        return self.solved
 
     def result(self, status: PlanStatus, **detail: float) -> PlanResult:
         """The result of the call: the best path so far as a plan, where the status has one."""

@@ -10,10 +10,10 @@ import numpy as np
 from pushplan.core import motion as core
 from pushplan.geometry.angles import wrap_angle
 from pushplan.motion.collision import footprint, obstacles
-from pushplan.motion.goal_approach import path_end, run_up
+from pushplan.motion.goal_approach import fitting, path_end, run_up
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.speed_profile import along_arcs, turning_radius
-from pushplan.world import GoalPose, Plan, PlanResult, PlanStatus, World
+from pushplan.world import GoalPose, NavigationGoal, Plan, PlanResult, PlanStatus, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.planning_call import PlanningCall
 
@@ -55,10 +55,13 @@ def polyline_plan(world: World, points: FloatArray, spacing: float) -> Plan:
 
 
 def polyline_status(world: World, plan: Plan) -> PlanStatus:
-    """Say whether the robot can drive a plan as it stands: `SOLVED`, or else `PATH_ONLY`.
+    """Say of a plan as it stands whether the robot can drive it, and whether it arrives.
 
-    It can where the plan begins at the robot's pose, turns no faster than the robot, and its
-    footprint, at poses a fiftieth of its circumscribed radius apart, touches nothing static.
+    Returns:
+        `PATH_ONLY` unless the plan begins at the robot's pose, turns no faster than the robot, and
+        its footprint, at poses a fiftieth of its circumscribed radius apart, touches nothing
+        static. Else `SOLVED`, or `APPROXIMATE` where the plan does not end in the goal of the
+        robot, at its heading if it has one.
     """
     robot = world.robot
     poses = plan.poses
@@ -74,7 +77,17 @@ def polyline_status(world: World, plan: Plan) -> PlanStatus:
         return PlanStatus.PATH_ONLY
     if blocked_pose(world, poses) is not None:
         return PlanStatus.PATH_ONLY
-    return PlanStatus.SOLVED
+    return PlanStatus.SOLVED if _arrives(world, poses[-1]) else PlanStatus.APPROXIMATE
+
+
+def _arrives(world: World, pose: FloatArray) -> bool:
+    """Return True if a pose (3,) is in the goal of the robot but for rounding, or there is none."""
+    goal = world.goal
+    if not isinstance(goal, NavigationGoal):
+        return True
+    if isinstance(goal, GoalPose) and abs(goal.heading_error(pose[2])) > goal.heading_tolerance:
+        return False
+    return goal.distance(*pose[:2].tolist()) <= 1e-6 * world.robot.circumscribed_radius
 
 
 def blocked_pose(world: World, poses: FloatArray) -> FloatArray | None:
@@ -106,20 +119,15 @@ def polyline_result(
     spacing: float,  # distance between the poses of its plan [R]
     iterations: int,
 ) -> PlanResult:
-    """The result of a planner whose paths are polylines.
-
-    The status is `APPROXIMATE` where the plan leads to the goal, but cannot end at its heading.
-    """
+    """The result of a planner whose paths are polylines, with the status of `polyline_status`."""
     world = call.world
     spacing = spacing * world.robot.circumscribed_radius
     plan = polyline_plan(world, points, spacing)
     goal = world.navigation_goal
     if isinstance(goal, GoalPose) and not goal.reached_by(plan.poses[-1]):
-        ended = _ended_at(world, goal, plan, spacing)
-        if ended is None:
-            return call.result(PlanStatus.APPROXIMATE, plan, iterations=iterations)
-        plan = ended
-    return call.result(polyline_status(world, plan), plan, call.elapsed, iterations)
+        plan = _ended_at(world, fitting(world, goal) or goal, plan, spacing) or plan
+    first = call.elapsed if _arrives(world, plan.poses[-1]) else math.nan
+    return call.result(polyline_status(world, plan), plan, first, iterations)
 
 
 def _ended_at(world: World, goal: GoalPose, plan: Plan, spacing: float) -> Plan | None:

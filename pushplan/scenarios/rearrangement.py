@@ -19,6 +19,7 @@ ARRANGEMENTS = ("random", "swapped")
 SHAPES = ("box", "t")
 
 _WALL = 0.1  # thickness [m]
+_AT_BOUNDS = np.zeros((2, 2))  # of walls that are not outside
 _SIDES = {"box": 0.1, "t": 0.05}  # of a box, and of the squares that a T is made of [m]
 _DENSITY = 10.0  # of the objects [kg/m²]
 _FREE = 1.2  # distance of places from the walls [diameters of the robot] and half a side
@@ -118,6 +119,9 @@ def load_relopush(
 ) -> World:
     """One instance of a file of ReloPush (Ahn and Mavrogiannis, arXiv 2409.18231).
 
+    The workspace of ReloPush bounds the origin of the robot. We add walls around it; where a block
+    or a place reaches over a side, that wall is farther out, so that the robot gets there.
+
     Args:
         path: a JSON list of instances: ``objects`` and ``goals`` [x, y, theta], the ``robot``'s
             pose, and ``raw_other.assign``, pairs of an object and a goal.
@@ -162,35 +166,48 @@ def load_relopush(
         np.full(count, 4),
     )
     movables = Movables.from_outlines([box] * len(starts), starts, density=_DENSITY)
-    return World(robot, pose, _room(np.zeros(2), np.array(RELOPUSH_ROOM)), movables, goal)
+    corners = np.concatenate([transform(at, box) for at in (*starts, *ends)])
+    low = corners.min(axis=0) < 0.0
+    high = corners.max(axis=0) > RELOPUSH_ROOM
+    outside = robot.circumscribed_radius * np.array([low, high])
+    return World(robot, pose, _room(np.zeros(2), np.array(RELOPUSH_ROOM), outside), movables, goal)
 
 
 def _outline(shape: str) -> list[FloatArray]:
     """Convex parts about the centroid of all."""
     side = _SIDES[shape]
     if shape == "box":
-        return [_rectangle(-0.5 * side, -0.5 * side, 0.5 * side, 0.5 * side)]
-    bar = _rectangle(-2.0 * side, 0.0, 2.0 * side, side)
-    stem = _rectangle(-0.5 * side, -3.0 * side, 0.5 * side, 0.0)
+        return [rectangle(-0.5 * side, -0.5 * side, 0.5 * side, 0.5 * side)]
+    bar = rectangle(-2.0 * side, 0.0, 2.0 * side, side)
+    stem = rectangle(-0.5 * side, -3.0 * side, 0.5 * side, 0.0)
     middle = np.array([0.0, (4.0 * 0.5 - 3.0 * 1.5) / 7.0 * side])  # areas of 4 and 3 squares
     return [bar - middle, stem - middle]
 
 
-def _rectangle(x0: float, y0: float, x1: float, y1: float) -> FloatArray:
+def rectangle(x0: float, y0: float, x1: float, y1: float) -> FloatArray:
+    """(4, 2) corners [m] of an upright rectangle, counter-clockwise."""
     return np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
 
 
-def _room(low: FloatArray, high: FloatArray) -> StaticMap:
-    x0, y0 = low.tolist()
-    x1, y1 = high.tolist()
-    t = _WALL
-    walls = [
-        _rectangle(x0 - t, y0 - t, x1 + t, y0),
-        _rectangle(x0 - t, y1, x1 + t, y1 + t),
-        _rectangle(x0 - t, y0, x0, y1),
-        _rectangle(x1, y0, x1 + t, y1),
-    ]
-    return StaticMap.build(walls, bounds=(x0, y0, x1, y1))
+def walls_around(
+    bounds: tuple[float, float, float, float], thickness: float
+) -> tuple[FloatArray, ...]:
+    """Four walls, each (4, 2) corners [m], around a room x_min, y_min, x_max, y_max [m]."""
+    x0, y0, x1, y1 = bounds
+    t = thickness
+    return (
+        rectangle(x0 - t, y0 - t, x1 + t, y0),
+        rectangle(x0 - t, y1, x1 + t, y1 + t),
+        rectangle(x0 - t, y0, x0, y1),
+        rectangle(x1, y0, x1 + t, y1),
+    )
+
+
+def _room(low: FloatArray, high: FloatArray, outside: FloatArray = _AT_BOUNDS) -> StaticMap:
+    """Bounds, and walls (2, 2) so far outside of the low and the high ones [m]."""
+    below, beyond = outside
+    walls = walls_around((*(low - below).tolist(), *(high + beyond).tolist()), _WALL)
+    return StaticMap.build(walls, bounds=(*low, *high))
 
 
 def _spread_out(

@@ -5,7 +5,7 @@ from manipulation_checks import check_reach, check_start, shapes
 
 from pushplan.envs import PushEnv
 from pushplan.envs.tasks.area_clearing import LAYOUTS, PRESETS, AreaClearingTask, open_edges
-from pushplan.envs.tasks.layout import rectangle
+from pushplan.scenarios.rearrangement import rectangle
 from pushplan.world import ScenarioError, StaticMap, UnknownNameError, stream
 
 OTHERS = [pytest.param(name, marks=pytest.mark.slow) for name in PRESETS if name != "benchmark"]

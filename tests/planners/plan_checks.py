@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from pushplan.world import Drive, Plan, PlanStatus, World
+from pushplan.world import Drive, GoalLine, GoalPose, Plan, PlanStatus, World
 from pushplan.world.outline import transform
 
 FRACTIONS = np.array([0.0, 0.25, 0.5, 0.75])
@@ -21,16 +21,55 @@ def check_plan(world: World, plan: Plan, status: PlanStatus) -> None:
     if status is not PlanStatus.APPROXIMATE:
         x, y = plan.poses[-1, :2].tolist()
         assert world.goal.distance(x, y) <= 1e-6 * size + rounding, "goal"
+    if plan.object_poses is not None:
+        off = np.abs(plan.object_poses[0] - world.movables.poses).max(initial=0.0)
+        assert off <= 1e-9 * max(1.0, size) + rounding, f"objects begin {off} away"
+    if status is PlanStatus.SOLVED and isinstance(world.goal, GoalPose):
+        off = _turn(plan.poses[-1, 2] - world.goal.heading)
+        assert abs(off) <= world.goal.heading_tolerance + 1e-9, f"goal heading {off}"
     if status is not PlanStatus.PATH_ONLY:
         _check_motion(world, plan, rounding)
         _check_walls(world, plan, rounding)
+
+
+def check_no_way(world: World, seed: int) -> None:
+    """Where no plan is possible: no disc gets to the goal, or the robot fits at no pose in it."""
+    robot, goal, static = world.robot, world.goal, world.static
+    radius = 0.98 * robot.inscribed_radius
+    walls = [shapely.Polygon(part).buffer(radius) for part in static.convex_parts]
+    free = shapely.difference(shapely.box(*static.bounds), shapely.union_all(walls))
+    here = shapely.Point(world.robot_pose[:2])
+    rooms = [room for room in shapely.get_parts(free) if room.intersects(here)]
+    if isinstance(goal, GoalLine):
+        ahead, aside = 1e3 * goal.normal, 1e3 * np.array([-goal.normal[1], goal.normal[0]])
+        ends = [goal.point - aside, goal.point + aside]
+        area = shapely.Polygon([*ends, ends[1] + ahead, ends[0] + ahead])
+    else:
+        area = shapely.Point(goal.center).buffer(goal.radius)
+    if not isinstance(goal, GoalPose) or not any(room.intersects(area) for room in rooms):
+        assert not any(room.intersects(area) for room in rooms), "a disc gets to the goal"
+        return
+    solid = shapely.union_all([shapely.Polygon(part) for part in static.convex_parts])
+    angle, away, turn = np.random.default_rng(seed).uniform(-1.0, 1.0, (3, 2000))
+    shift = goal.radius * np.sqrt(np.abs(away))
+    at = goal.center + shift[:, None] * np.stack([np.cos(4 * angle), np.sin(4 * angle)], axis=1)
+    poses = np.column_stack([at, goal.heading + turn * goal.heading_tolerance])
+    hulls = [shapely.polygons([transform(pose, part) for pose in poses]) for part in robot.parts]
+    fits = ~np.any([shapely.intersects(solid, shapes) for shapes in hulls], axis=0)
+    fits &= shapely.intersects_xy(shapely.box(*static.bounds), at)
+    assert not fits.any(), f"the robot fits at {poses[fits][:1]}"
+
+
+def _turn(angle: float) -> float:
+    """The same turn within half a turn to either side [rad]."""
+    return float(np.remainder(angle + np.pi, 2.0 * np.pi) - np.pi)
 
 
 def _check_motion(world: World, plan: Plan, rounding: float) -> None:
     """Starts at the robot's heading, drives as it can, and keeps every limit of the robot."""
     robot, moved, steps = world.robot, np.diff(plan.poses, axis=0), np.diff(plan.times)
     size = robot.circumscribed_radius
-    off = np.remainder(plan.poses[0, 2] - world.robot_pose[2] + np.pi, 2.0 * np.pi) - np.pi
+    off = _turn(plan.poses[0, 2] - world.robot_pose[2])
     assert abs(off) <= 1e-9, f"heading {off}"
     turns = np.abs(moved[:, 2])
     most = 1e-6 + rounding / size

@@ -11,6 +11,7 @@ from pushplan.planners.registry import OPEN_WATER
 from pushplan.world import (
     GoalDisc,
     GoalLine,
+    GoalPose,
     Movables,
     RobotModel,
     StaticMap,
@@ -29,6 +30,17 @@ HULLS = {
     "cart": 0.5 * SQUARE + [0.25, 0.0],  # turns about the middle of its rear edge
     "tractor": 0.5 * SQUARE + [0.6, 0.0],  # turns about a point outside of it
 }
+ANGLE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, -0.1], [-0.1, -0.1], [-0.1, 0.5], [-0.5, 0.5]])
+CROSS = [SQUARE * [1.0, 0.3], SQUARE * [0.3, 1.0]]
+DRIVES: tuple[dict[str, object], ...] = (
+    {"drive": "differential"},
+    {"drive": "differential", "min_speed": -0.1},
+    {"drive": "car"},
+    {"drive": "car", "min_speed": -0.1},
+    {"drive": "omnidirectional"},
+    {"drive": "constant_speed"},
+)
+"""The last one is all that planners of ships and `skeleton` are made for."""
 SIDE = 10.0  # of every random world before it is scaled [m]
 HALL = 40.0  # side of a hall of posts [m]
 Rng = np.random.Generator
@@ -145,6 +157,30 @@ def random_world(seed: int, planner: str = "") -> World:
     return replace(world, static=_static([]))
 
 
+def driven_world(seed: int, planner: str = "") -> World:
+    """A random world for every drive and goal, with robots and objects that are not convex."""
+    rng = np.random.default_rng([seed, 7])
+    world = random_world(seed, planner)
+    if planner == "namo" or planner in OPEN_WATER or planner.startswith("ship"):
+        return replace(world, movables=_shapes(rng, int(rng.integers(0, 8))))
+    limits = dict(DRIVES[seed % len(DRIVES)])
+    if limits["drive"] == "car":
+        limits["min_turning_radius"] = float(rng.uniform(0.3, 1.5))
+    if rng.random() < 0.3:
+        limits |= {"max_acceleration": 0.3, "max_turn_acceleration": float(rng.uniform(0.5, 3.0))}
+    old = world.robot
+    outline = ANGLE * rng.uniform(0.3, 1.0) if rng.random() < 0.2 else old.parts[0]
+    robot = RobotModel.from_outline(
+        outline, mass=old.mass, max_speed=0.15, max_turn_rate=old.max_turn_rate, **limits
+    )
+    goal = world.goal
+    if isinstance(goal, GoalDisc) and rng.random() < 0.6:
+        tolerance = float(rng.choice([0.02, 0.2, np.pi]))
+        goal = GoalPose(goal.center, min(goal.radius, 0.3), float(rng.uniform(-3, 3)), tolerance)
+    objects = _shapes(rng, int(rng.integers(0, 8)))
+    return replace(world, robot=robot, goal=goal, movables=objects)
+
+
 def posts(count: int, seed: int, planner: str = "") -> World:
     """A robot in one corner of a hall of posts, its goal in the other one."""
     rng = np.random.default_rng(seed)
@@ -213,6 +249,21 @@ def _boxes(rng: Rng, count: int) -> Movables:
     outlines = [SQUARE * 10 ** rng.uniform(-3, 0, 2) for _ in range(count)]
     poses = np.column_stack([rng.uniform(0, SIDE, (count, 2)), rng.uniform(-3, 3, count)])
     return Movables.from_outlines(outlines, poses.reshape(-1, 3))
+
+
+def _shapes(rng: Rng, count: int) -> Movables:
+    """Angles, crosses of two parts, and boxes; they may overlap anything."""
+    poses = np.column_stack([rng.uniform(0, SIDE, (count, 2)), rng.uniform(-3, 3, count)])
+    kinds = rng.integers(0, 3, count)
+    sizes = rng.uniform(0.1, 1.0, count)
+    shapes = [
+        [[ANGLE * size], [size * part for part in CROSS], [SQUARE * size]][kind]
+        for kind, size in zip(kinds, sizes, strict=True)
+    ]
+    objects = Movables.from_polygons(
+        [[part + np.array([3 * k, 0]) for part in s] for k, s in enumerate(shapes)]
+    )
+    return objects.moved_to(poses.reshape(-1, 3))
 
 
 def _static(posts: object, ends: object = (), radii: object = 0.05) -> StaticMap:

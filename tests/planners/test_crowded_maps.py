@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import quickest
+from conftest import SQUARE, quickest
+from plan_checks import check_plan
 from random_worlds import posts
 
 from pushplan.geometry.contours import prepare_contours
@@ -14,7 +15,17 @@ from pushplan.motion.coarse_path import coarse_path
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.keyholes import KeyholeConfig, suits_keyholes
 from pushplan.planners import make_planner
-from pushplan.world import PlanStatus, StaticMap, Stop, checks
+from pushplan.world import (
+    GoalDisc,
+    MaxIterations,
+    Movables,
+    PlanStatus,
+    StaticMap,
+    Stop,
+    World,
+    box_delivery_robot,
+    checks,
+)
 from pushplan.world.outline import grown_outline
 
 PLANNERS = ("straight", "skeleton", "kinodynamic-rrt", "push-aware")
@@ -99,3 +110,22 @@ def test_a_map_that_is_made_again_is_known_without_reading_it_again(monkeypatch)
 
 def remade(static: StaticMap) -> StaticMap:
     return StaticMap(static.polygons, static.segments, static.radii, static.bounds)
+
+
+@pytest.mark.parametrize("overlapping", [True, False])
+def test_there_is_a_plan_through_a_crowd_that_nothing_holds(overlapping):
+    """The usual rounds of the contact solver leave overlaps, which are no jam."""
+    static = StaticMap.build(segments=[[0, 0, 9, 0], [0, 5, 9, 5]], radii=0.05, bounds=[0, 0, 9, 5])
+    goal = GoalDisc([6.0, 2.5], 0.2)
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        places = []
+        while len(places) < 24:
+            pose = rng.uniform([1.8, 1.2, -3.0], [5.5, 3.8, 3.0])
+            if overlapping or all(np.hypot(*(pose - other)[:2]) > 0.43 for other in places):
+                places.append(pose)
+        boxes = Movables.from_outlines([0.3 * SQUARE] * 24, places, density=10.0)
+        world = World(box_delivery_robot(), [0.6, 2.5, 0.0], static, boxes, goal)
+        result = make_planner("push-aware").plan(world, stop=MaxIterations(1000))
+        assert result.status is PlanStatus.SOLVED
+        check_plan(world, result.plan, result.status)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from conftest import SQUARE
+from plan_checks import check_plan
 
 from pushplan.core import motion as core
 from pushplan.motion.collision import footprint, obstacles
@@ -120,6 +122,19 @@ def test_a_pose_in_a_wall_cannot_be_reached(planner):
     wall = np.array([[5.9, 6.22], [6.1, 6.22], [6.1, 6.4], [5.9, 6.4]])
     assert plan(room(0.0, walls=[wall]), planner)[0] is PlanStatus.SOLVED
     assert plan(room(1.5, walls=[wall]), planner)[0] is PlanStatus.GOAL_UNREACHABLE
+
+
+@pytest.mark.parametrize("drive", DRIVES)
+@pytest.mark.parametrize("planner", ["kinodynamic-rrt", "push-aware"])
+def test_a_robot_that_does_not_fit_in_the_middle_ends_beside_it(planner, drive):
+    post = np.array([[6.1, 6.05], [6.4, 6.05], [6.4, 6.4], [6.1, 6.4]])
+    goal = GoalPose([6.0, 6.0], 0.4, 0.0, 0.5)
+    world = room(0.0, drive, walls=[post], goal=goal)
+    status, found = plan(world, planner)
+    assert status is PlanStatus.SOLVED
+    check_plan(world, found, status)
+    narrow = GoalPose([6.0, 6.0], 0.1, 0.0, 0.1)
+    assert plan(replace(world, goal=narrow), planner)[0] is PlanStatus.GOAL_UNREACHABLE
 
 
 def test_a_box_beside_the_goal_is_predicted_to_be_turned_away():

@@ -7,15 +7,19 @@ asks every planner in so many worlds; `random_worlds` makes them and `plan_check
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
-from plan_checks import check_plan
-from random_worlds import random_world, similar
+from plan_checks import check_no_way, check_plan
+from random_worlds import driven_world, random_world, similar
 
+from pushplan.motion.polyline_plan import polyline_plan, polyline_status
 from pushplan.planners import make_planner, planner_names
 from pushplan.world import (
     FirstSolution,
     GoalDisc,
+    GoalPose,
     MaxIterations,
     Movables,
     PlanResult,
@@ -31,6 +35,10 @@ AS_PUBLISHED = "ship-lattice-published"
 ITERATIONS = {"ship-predictive-published": 40}
 PLANNERS = planner_names()
 COUNTS = [4, pytest.param(150, marks=pytest.mark.slow)]
+MANY = [
+    *((name, 40) for name in PLANNERS if not name.startswith("ship")),
+    *(pytest.param(name, 2000, marks=pytest.mark.slow) for name in PLANNERS),
+]
 FEW = [2, pytest.param(40, marks=pytest.mark.slow)]
 
 
@@ -47,6 +55,8 @@ def planned(name: str, world: World, seed: int) -> PlanResult:
     assert (result.plan is not None) == result.status.has_plan
     if result.plan is not None:
         check_plan(world, result.plan, result.status)
+    if result.status is PlanStatus.GOAL_UNREACHABLE:
+        check_no_way(world, seed)
     return result
 
 
@@ -55,17 +65,27 @@ def cost(result: PlanResult) -> float:
     return 0.0 if result.plan is None else result.plan.travel_cost
 
 
-@pytest.mark.parametrize("count", COUNTS)
-@pytest.mark.parametrize("name", PLANNERS)
-def test_a_plan_is_what_its_status_says(name: str, worlds: int) -> None:
+def check_worlds(name: str, worlds: int, make: Callable[[int, str], World]) -> None:
+    """Plan in so many worlds; what is wrong is said of all of them."""
     found, wrong = 0, []
     for seed in range(worlds):
         try:
-            found += planned(name, random_world(seed, name), seed).status.has_plan
+            found += planned(name, make(seed, name), seed).status.has_plan
         except AssertionError as error:
             wrong.append(f"world {seed}: {error}")
     assert not wrong, "\n".join(wrong)
     assert found >= 0.3 * worlds
+
+
+@pytest.mark.parametrize("count", COUNTS)
+@pytest.mark.parametrize("name", PLANNERS)
+def test_a_plan_is_what_its_status_says(name: str, worlds: int) -> None:
+    check_worlds(name, worlds, random_world)
+
+
+@pytest.mark.parametrize(("name", "count"), MANY)
+def test_so_it_is_for_every_drive_goal_and_shape(name: str, worlds: int) -> None:
+    check_worlds(name, worlds, driven_world)
 
 
 @pytest.mark.parametrize("count", FEW)
@@ -115,3 +135,32 @@ def test_a_path_for_a_point_is_solved_only_where_the_robot_can_drive_it() -> Non
     for name in ("straight", "skeleton", "geometric-rrt"):
         turned = ahead.moved(robot_pose=[2.0, 5.0, 1.0])
         assert planned(name, turned, 0).status is PlanStatus.PATH_ONLY
+
+
+def test_a_path_of_ones_own_that_ends_short_of_the_goal_is_approximate() -> None:
+    free = StaticMap.build(bounds=[0, 0, 10, 10])
+    poses = {"place": [8.0, 5.0], "short": [6.0, 5.0]}
+    goals = {
+        "disc": GoalDisc(poses["place"], 0.5),
+        "ahead": GoalPose(poses["place"], 0.5, 0.0, 0.1),
+        "aside": GoalPose(poses["place"], 0.5, 1.0, 0.1),
+    }
+    ends = {}
+    for name, goal in goals.items():
+        world = World(random_world(7).robot, [2.0, 5.0, 0.0], free, Movables.empty(), goal)
+        for end, place in poses.items():
+            plan = polyline_plan(world, np.array([[2.0, 5.0], place]), 0.1)
+            ends[name, end] = polyline_status(world, plan)
+    arrive = {key for key, status in ends.items() if status is PlanStatus.SOLVED}
+    assert arrive == {("disc", "place"), ("ahead", "place")}
+    assert {ends[key] for key in ends.keys() - arrive} == {PlanStatus.APPROXIMATE}
+
+
+@pytest.mark.parametrize("seed", [12, 19, 167, 713, 1285])
+def test_a_ship_has_a_way_where_another_planner_knows_one(seed: int) -> None:
+    """The tightest turn fits to neither side, or the beam ends before the line."""
+    world = random_world(seed, "ship-predictive")
+    result = make_planner("ship-predictive").plan(world)
+    assert result.status is PlanStatus.SOLVED
+    assert result.plan is not None
+    check_plan(world, result.plan, result.status)

@@ -90,6 +90,23 @@ def test_instances_of_relopush_are_read(tmp_path):
     assert load_relopush(file, 3, robot=ROBOT).robot_pose.tolist() == [1.0, 2.0, 0.0]
 
 
+def test_walls_leave_the_places_of_relopush_free(tmp_path):
+    """Its workspace bounds the robot's origin: places may reach over it, and do in `data_2o1r`."""
+    corner = {**INSTANCE, "goals": {"d1": [0.015, 0.02, 0.0], "d2": [3.0, 4.0, 0.3]}}
+    file = tmp_path / "instances.json"
+    file.write_text(json.dumps([corner, INSTANCE]))
+    inner, usual = (load_relopush(file, i, robot=ROBOT) for i in (0, 1))
+    for world in (inner, usual):
+        walls = shapely.union_all([shapely.Polygon(wall) for wall in world.static.convex_parts])
+        placed = np.concatenate(world.goal_polygons)
+        assert not shapely.intersects_xy(walls, placed).any()
+        assert world.static.bounds.tolist() == [0.0, 0.0, 4.0, 5.4]
+        x0, y0, x1, y1 = shapely.difference(shapely.box(*walls.bounds), walls).bounds
+        assert [x1, y1] == pytest.approx([4.0, 5.4])
+        away = ROBOT.circumscribed_radius if world is inner else 0.0
+        assert [x0, y0] == pytest.approx([-away, -away])
+
+
 @pytest.mark.parametrize(
     "wrong",
     [

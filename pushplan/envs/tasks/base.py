@@ -245,6 +245,9 @@ class Task(ABC):
 
     _nominal: Movables | None = None  # the objects of a start as the preset has them
 
+    may_overlap: bool = False
+    """True if objects of a start may overlap one another."""
+
     objects_leave: bool = False
     """True if objects can leave the floor, so that `leaving` has to be asked."""
 

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 import shapely
 
-from pushplan.envs.tasks.layout import rectangle, those_inside, walls_around
+from pushplan.envs.tasks.layout import those_inside
 from pushplan.envs.tasks.manipulation_task import (
     START_TRIES,
     ManipulationTask,
@@ -17,6 +17,7 @@ from pushplan.envs.tasks.manipulation_task import (
 )
 from pushplan.envs.tasks.presets import read_presets
 from pushplan.envs.tasks.variations import Yaw
+from pushplan.scenarios.rearrangement import rectangle, walls_around
 from pushplan.world import Receptacle, StaticMap, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 

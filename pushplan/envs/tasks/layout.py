@@ -368,25 +368,6 @@ def footprint_at(robot: RobotModel, pose: FloatArray) -> list[Any]:
     return [shapely.Polygon(transform(pose, part)) for part in robot.contact_parts]
 
 
-def rectangle(x0: float, y0: float, x1: float, y1: float) -> FloatArray:
-    """(4, 2) corners [m] of an upright rectangle, counter-clockwise."""
-    return np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
-
-
-def walls_around(
-    bounds: tuple[float, float, float, float], thickness: float
-) -> tuple[FloatArray, ...]:
-    """Four walls, each (4, 2) corners [m], around a room x_min, y_min, x_max, y_max [m]."""
-    x0, y0, x1, y1 = bounds
-    t = thickness
-    return (
-        rectangle(x0 - t, y0 - t, x1 + t, y0),
-        rectangle(x0 - t, y1, x1 + t, y1 + t),
-        rectangle(x0 - t, y0, x0, y1),
-        rectangle(x1, y0, x1 + t, y1),
-    )
-
-
 def squares(poses: FloatArray, size: float) -> FloatArray:
     """(N, 4, 2) corners [m] of squares of side ``size`` at poses (N, 3)."""
     count = len(poses)

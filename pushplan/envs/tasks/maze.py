@@ -15,13 +15,12 @@ from pushplan.envs.tasks.layout import (
     FreeSpace,
     footprint_at,
     place_boxes,
-    rectangle,
-    walls_around,
 )
 from pushplan.envs.tasks.presets import Preset, read_presets
 from pushplan.envs.tasks.variations import Objects, TaskVariations, Yaw
 from pushplan.geometry.distance_field import GeodesicField, geodesic_field
 from pushplan.observation import ImageObservation
+from pushplan.scenarios.rearrangement import rectangle, walls_around
 from pushplan.world import BUMPERS, GoalDisc, ScenarioError, StaticMap, World
 from pushplan.world.checked_fields import NonNegativeInt, OneOf, PositiveFloat
 from pushplan.world.checks import FloatArray

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pushplan.envs.tasks.layout import rectangle, walls_around
+from pushplan.scenarios.rearrangement import rectangle, walls_around
 from pushplan.world import StaticMap
 from pushplan.world.checks import FloatArray
 

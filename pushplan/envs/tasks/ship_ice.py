@@ -131,11 +131,11 @@ class ShipIceTask(Task):
         if path is None:
             return None
         try:
-            overlaps = self.variations.ice_overlaps or self.preset.overlaps
+            self.may_overlap = self.variations.ice_overlaps or self.preset.overlaps
             field = load_ice(
                 path,
                 hull=self.variations.ice_hull,
-                overlaps=overlaps,
+                overlaps=self.may_overlap,
                 within=self.static.bounds,
             )
         except InvalidInputError as error:

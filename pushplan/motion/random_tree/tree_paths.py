@@ -123,7 +123,7 @@ class TreePaths:
             return None
         if len(coarse) == 0:
             if self._exact is None:
-                sealed = not reachable(world, improver.stopped)
+                sealed = not reachable(improver.given, improver.stopped)
                 if improver.stopped():
                     return None
                 self.sealed = sealed

@@ -9,6 +9,7 @@ import numpy as np
 from pushplan.interaction import InteractionModel, QuasiStatic
 from pushplan.motion.keyholes import KeyholeConfig, KeyholeSearch, suits_keyholes
 from pushplan.motion.keyholes.keyhole_plan import keyhole_plan
+from pushplan.motion.speed_profile import start_margin
 from pushplan.motion.time_slicing import Stopped
 from pushplan.planners.registry import make_planner
 from pushplan.world import MaxIterations, Plan, Planner, PlanResult, PlanStatus, Stop, World
@@ -104,8 +105,9 @@ class Namo:
         if other is not None and other.status is PlanStatus.SOLVED:
             if _cost(other.plan, weight) < _cost(plan, weight):
                 return other
+        blocked = start_margin(world, 0.0) is None  # the plan leads out of what it stands in
         return call.result(
-            PlanStatus.SOLVED,
+            PlanStatus.PATH_ONLY if blocked else PlanStatus.SOLVED,
             plan,
             call.elapsed,
             search.pushes,

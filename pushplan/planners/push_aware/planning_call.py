@@ -8,6 +8,7 @@ import numpy as np
 
 from pushplan.core import planners as core
 from pushplan.core import search
+from pushplan.motion.dubins_warm_start import set_aside_drive
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.length_bound import length_bound
 from pushplan.motion.local_windows import warm_start
@@ -97,7 +98,7 @@ class PushAwareSearch:
             for _ in range(2):
                 self._one_round()
             self._grow_at_random(self.config.random_fraction * (improver.iterations - begun))
-        return PlanStatus.SOLVED if improver.solved else None
+        return PlanStatus.SOLVED if improver.falls_back() else None
 
     def _first_plan(self) -> PlanStatus | None:
         """Drive along the shortest path or, where that fails, grow trees until one has a plan.
@@ -113,6 +114,8 @@ class PushAwareSearch:
             return status
         trees.look_ahead()
         warm_start(improver)
+        if not improver.solved:
+            set_aside_drive(improver)
         while not improver.stopped():
             if trees.boxed_in:
                 return PlanStatus.START_BLOCKED

@@ -64,8 +64,8 @@ class GtspMpc(RearrangementPolicy):
         overrides: fields of the default config to change, in place of ``config``.
 
     With a goal of `ObjectGoals` objects are brought to places of their own (docs/gtsp-mpc.md). Of
-    the settings ``grip``, ``mpc``, ``order``, ``response`` and the noise count then; ``given_up``
-    and ``graph`` stay empty.
+    the settings ``grip``, ``mpc``, ``order``, ``response`` and the noise count then; ``graph`` is
+    empty.
 
     Attributes:
         given_up: why nothing more is tried with an object, by id.
@@ -150,6 +150,7 @@ class GtspMpc(RearrangementPolicy):
     def _act(self, world: World) -> Twist:
         if isinstance(world.goal, ObjectGoals):
             twist = self._placer.command(world, self._clock.held)
+            self.given_up = self._placer.given_up
             self.plan = self._placer.plan
             self.current_plan = self._placer.current_plan
             return twist

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pushplan.interaction import InteractionModel, QuasiStatic
-from pushplan.motion.dubins_warm_start import is_far
+from pushplan.motion.dubins_warm_start import is_far, set_aside_drive
 from pushplan.motion.local_windows import warm_start
 from pushplan.motion.path_improver import Candidate, PathImprover
 from pushplan.motion.path_search_config import PathSearchConfig
@@ -85,11 +85,13 @@ def _search(improver: PathImprover, trees: TreePaths) -> PlanStatus | None:
         if trees.sealed:
             return PlanStatus.GOAL_UNREACHABLE
         if not improver.solved:
+            if improver.spare is None:
+                set_aside_drive(improver)
             trees.change_start()
             trees.relax()
             if len(improver.lead.pieces):
                 warm_start(improver)
-    return PlanStatus.SOLVED if improver.solved else None
+    return PlanStatus.SOLVED if improver.falls_back() else None
 
 
 def _one_round(improver: PathImprover, trees: TreePaths) -> None:

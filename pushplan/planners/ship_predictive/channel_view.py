@@ -11,10 +11,14 @@ import numpy as np
 from pushplan.core import interaction
 from pushplan.core import planners as core
 from pushplan.interaction.ice_interaction import IceInteraction, IceSettings
+from pushplan.motion.collision import footprint, obstacles
+from pushplan.motion.goal_region import goal_numbers
+from pushplan.motion.room_ahead import Room, is_boxed_in
 from pushplan.motion.speed_profile import check_turns
 from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
 from pushplan.world import GoalLine, InvalidInputError, Movables, PlanStatus, World
 from pushplan.world.checks import FloatArray, IntArray
+from pushplan.world.planning_call import PlanningCall
 
 STEEPEST = math.radians(80.0)
 """Greatest angle between the ship and the direction ahead in the table of costs to go."""
@@ -60,6 +64,16 @@ class ChannelView:
             return PlanStatus.GOAL_UNREACHABLE
         return None
 
+    def without_path(self, call: PlanningCall) -> PlanStatus:
+        """The status of a call that has found no path, which does not prove that there is none."""
+        robot = self.world.robot
+        goal = goal_numbers(self.world.navigation_goal, 0.0)
+        room = Room(footprint(robot), obstacles(self.world.static), goal, 0.0)
+        pose = self.world.robot_pose
+        if is_boxed_in(robot, room, pose, robot.turning_radius, lambda: call.check(0, math.inf)):
+            return PlanStatus.START_BLOCKED
+        return call.stopped_status
+
     def to_world(self, poses: FloatArray) -> FloatArray:
         """Carry (..., 3) poses from the frame of the channel to the world's."""
         c = math.cos(self.turn)
@@ -88,8 +102,16 @@ class ChannelView:
         return abs(math.sin(2.0 * self.turn)) > 1e-9
 
 
-def channel_view(world: World, config: PredictiveConfig, model: IceInteraction) -> ChannelView:
+def channel_view(
+    world: World, config: PredictiveConfig, model: IceInteraction, turns: float = 0.0
+) -> ChannelView:
     """Look at a world.
+
+    Args:
+        world: the snapshot.
+        config: of the planner.
+        model: of the ice.
+        turns: room for turns to both sides of the way ahead [turning radii].
 
     Raises:
         InvalidInputError: if the goal is no line, something static is in the water, or the robot
@@ -114,7 +136,8 @@ def channel_view(world: World, config: PredictiveConfig, model: IceInteraction) 
     radius = robot.turning_radius / config.turn_fraction
     margin = config.margin * 0.5 * float(np.ptp(robot.vertices[:, 1])) + world.margin
     low, high = _box(world, turn, margin, (1.0 + 1e-6) * radius * (1.0 - math.cos(off)), off)
-    aside = 0.5 * max(goal, 0.0) + 5.0 * length  # no path leads farther from the straight one
+    # paths seldom lead farther from the straight one
+    aside = 0.5 * max(goal, 0.0) + 5.0 * length + turns * radius
     low[0], high[0] = max(low[0], min(-aside, high[0])), min(high[0], max(aside, low[0]))
     channel = Channel(goal, low, high)
     objects = world.movables.select(near)

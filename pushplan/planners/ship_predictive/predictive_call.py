@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
 from collections.abc import Callable
@@ -17,12 +18,18 @@ from pushplan.planners.ship_predictive.beam_node import BeamNode, StatePropagato
 from pushplan.planners.ship_predictive.beam_search import BeamSearch
 from pushplan.planners.ship_predictive.channel_view import ChannelView, channel_view
 from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
-from pushplan.planners.ship_predictive.turning import in_table, tight_turn, turned_start
+from pushplan.planners.ship_predictive.turning import (
+    in_table,
+    tight_turn,
+    turned_start,
+    way_round,
+)
 from pushplan.world import Plan, PlanResult, PlanStatus
 from pushplan.world.checks import FloatArray
 from pushplan.world.planning_call import PlanningCall
 from pushplan.world.polyline import step_lengths
 
+_ROOM = 4.0  # for turns in a thorough search [turning radii]
 _TIGHTEST = 0.999  # fraction of the turn rate that is used where there is no path with less
 
 
@@ -32,22 +39,25 @@ def plan_call(
     interaction: IceInteraction,
     make_propagator: Callable[[ChannelView], StatePropagator[Any]],
 ) -> PlanResult:
-    """Plan with the usual turn rate, or with all of it where there is no path otherwise."""
+    """Plan with the usual turn rate, or with all of it where there is no path otherwise.
+
+    Where neither has led to the goal, both are searched again, thoroughly.
+    """
     iterations = nodes = 0
-    for fraction in dict.fromkeys((config.turn_fraction, max(config.turn_fraction, _TIGHTEST))):
-        view = channel_view(call.world, replace(config, turn_fraction=fraction), interaction)
+    fractions = dict.fromkeys((config.turn_fraction, max(config.turn_fraction, _TIGHTEST)))
+    for thorough, fraction in itertools.product((False, True), fractions):
+        settings = replace(config, turn_fraction=fraction)
+        view = channel_view(call.world, settings, interaction, _ROOM if thorough else 0.0)
         propagator = make_propagator(view)
         beam: BeamSearch[Any] = BeamSearch(view, config, propagator, call.check, iterations)
-        search = PredictiveCall(beam, widening=call.has_rule)
+        search = PredictiveCall(beam, call.has_rule or thorough, thorough)
         status = search.run()
         iterations = beam.iterations
         nodes = nodes + beam.nodes
-        if status is not PlanStatus.GOAL_UNREACHABLE:
+        if status is not None or beam.stopped:
             break
-    if status is PlanStatus.TIMED_OUT:
-        status = call.stopped_status  # it may have been cancelled
     return call.result(
-        status,
+        status or view.without_path(call),
         search.plan(),
         search.first - call.began,
         iterations,
@@ -63,12 +73,13 @@ class PredictiveCall:
 
     beam: BeamSearch[Any]
     widening: bool  # True to go on with wider beams
+    thorough: bool  # True to begin with a curve that leads to the goal through whatever is there
     first: float = math.nan  # when there was a plan, on the clock of `time.perf_counter`
     _best: BeamNode[Any] | None = None
     _objects: FloatArray | None = None
 
-    def run(self) -> PlanStatus:
-        """Search until done or stopped."""
+    def run(self) -> PlanStatus | None:
+        """Search until done or stopped; None where no path was found."""
         beam = self.beam
         view = self.beam.view
         if view.closed is not None:
@@ -85,18 +96,22 @@ class PredictiveCall:
         if root is not None:
             self._consider(beam.finish(root))
         if self._best is None and turn is not None and not beam.stopped:
-            ahead = beam.follow(beam.root(), turn)  # out of where the costs to go hold
-            if ahead is not None:
-                self._consider(beam.finish(ahead))
+            self._follow(turn)  # out of where the costs to go hold
+        if self.thorough and (way := way_round(view)) is not None:
+            self._follow(way)
         if root is not None:
             self._widen(root)
-        if self._best is None and beam.stopped:
-            return PlanStatus.TIMED_OUT
         if self._best is None:
-            return PlanStatus.GOAL_UNREACHABLE
+            return None
         if view.channel.goal < view.away:
             return PlanStatus.APPROXIMATE
         return PlanStatus.SOLVED
+
+    def _follow(self, way: FloatArray) -> None:
+        """Consider a (N, 4) way from the ship, and on to the goal."""
+        ahead = self.beam.follow(self.beam.root(), way)
+        if ahead is not None:
+            self._consider(self.beam.finish(ahead))
 
     def _widen(self, root: BeamNode[Any]) -> None:
         beam = self.beam

@@ -66,7 +66,7 @@ class PredictivePublished:
             )
             while not search.arrived:
                 if not search.expand():
-                    status = PlanStatus.GOAL_UNREACHABLE
+                    status = view.without_path(call)
                     return call.result(status, None, math.nan, expanded, expanded)
                 expanded += 1
         except Stopped:

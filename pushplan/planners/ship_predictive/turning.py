@@ -6,9 +6,15 @@ import math
 
 import numpy as np
 
+from pushplan.core import motion as core
+from pushplan.motion.dubins_warm_start import ARCS
+from pushplan.motion.state_lattice.lattice_path import sample_arcs
 from pushplan.planners.ship_predictive.beam_search import SPACING
 from pushplan.planners.ship_predictive.channel_view import STEEPEST, ChannelView
 from pushplan.world.checks import FloatArray
+
+_PLACES = 9  # on the goal line to which curves may lead
+_HEADINGS = 5  # at each of them
 
 
 def tight_turn(view: ChannelView) -> FloatArray | None:
@@ -38,6 +44,28 @@ def tight_turn(view: ChannelView) -> FloatArray | None:
             arc = arc[: arrived[0] + 1]
         if view.inside(arc):
             return arc
+    return None
+
+
+def way_round(view: ChannelView) -> FloatArray | None:
+    """The shortest curve of Dubins that leads to some place of the goal line and fits.
+
+    Returns:
+        (N, 4) poses and curvatures, the first being the ship's; None where none of them fits.
+    """
+    goal = view.channel.goal
+    curves = []
+    for x in np.linspace(view.channel.low[0], view.channel.high[0], _PLACES):
+        for heading in np.linspace(0.5 * math.pi - STEEPEST, 0.5 * math.pi + STEEPEST, _HEADINGS):
+            arcs = np.empty((ARCS, 2))
+            end = np.array([x, goal, heading])
+            length = core.shortest_curve(view.start, end, view.radius, False, arcs)
+            curves.append((length, arcs))
+    for _, arcs in sorted(curves, key=lambda curve: curve[0]):
+        poses, curvatures = sample_arcs(view.start, arcs, SPACING * view.length)
+        count = int(np.argmax(np.append(poses[:, 1], goal) >= goal)) + 1
+        if view.inside(poses[:count]):
+            return np.column_stack([poses, curvatures])[:count]
     return None
 
 

@@ -85,6 +85,25 @@ def drive(
     return env.world, commands
 
 
+def test_a_place_in_a_wall_is_given_up_and_the_others_are_not() -> None:
+    starts = [[0.5, 0.0, 0.0], [-0.5, 0.3, 0.0]]
+    inside, leaning = 1.4 + 0.05, 1.4 - 0.04  # the wall is at 1.4 m
+    found = {}
+    for x in (inside, leaning):
+        policy = GtspMpc()
+        world = scene_of(starts, [[x, 0.0, 0.0], [0.3, 0.6, 0.0]])
+        policy.reset(world, np.random.default_rng(0))
+        policy.act(world)
+        found[x] = list(policy.given_up), {push.target for push in policy.plan}
+    assert found[inside] == ([0], {1})
+    assert found[leaning][0] == []
+    done = scene_of(starts, [[inside, 0.0, 0.0], starts[1]])  # nothing is left to be done
+    policy = GtspMpc()
+    policy.reset(done, np.random.default_rng(0))
+    assert policy.act(done) == Twist(0.0, 0.0)
+    assert "0.1 m inside something static" in policy.given_up[0]
+
+
 def test_robot_and_object_fit_together_in_contact() -> None:
     movables = Movables.from_outlines([BOX], np.zeros((1, 3)))
     contacts = contacts_of(PUSHER, movables, 0, 0.4)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from pushplan.control import ImmediateExecutor, Legs, Recovery
+from pushplan.geometry.object_ways import blocked_places
 from pushplan.planners.rearrangement.placing.place_execution import PlaceExecution, Transit
 from pushplan.planners.rearrangement.placing.place_order import PlaceChoice, first_push, way_to
 from pushplan.planners.rearrangement.placing.place_push import PlacingHistory
@@ -35,6 +36,7 @@ class Placer:
         rng: of a random order.
 
     Attributes:
+        given_up: why nothing is tried with an object, by id.
         plan: the pushes planned last, in order.
         current_plan: the push in hand, with the way to it; None while there is none.
     """
@@ -56,6 +58,7 @@ class Placer:
         self._grip = config.grip
         self._recovery: Recovery | None = None
         self._retreats = 0
+        self.given_up: dict[int, str] = {}
         self.plan: tuple[Push, ...] = ()
         self.current_plan: Plan | None = None
 
@@ -99,6 +102,10 @@ class Placer:
         """Begin with a push; False if there is none, or it is not chosen yet."""
         if self._call is None:
             scene = PlacingScene(world, self._grip)
+            self.given_up = {
+                label: f"its place is {depth:.3g} m inside something static, so no push leads there"
+                for label, depth in blocked_places(world).items()
+            }
             self._call = self.executor.submit(
                 lambda stop: self._best(scene, stop), world.time, self._stop
             )
@@ -137,7 +144,7 @@ class Placer:
     ) -> PlaceChoice | Legs | FloatArray | None:
         """The next push, or the way to the robot's own goal."""
         if not scene.left:
-            return way_to(scene, scene.robot_goal)
+            return None if scene.goal.robot is None else way_to(scene, scene.robot_goal)
         check = None if stop is None else stop.start()
         pushes = PlacePushes(scene, self._history, check)
         thorough = PlacingScene(scene.world, scene.friction, thorough=True)

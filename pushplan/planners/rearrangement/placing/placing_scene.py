@@ -11,6 +11,7 @@ import shapely
 
 from pushplan.core import motion as core
 from pushplan.geometry import VisibilityGraph
+from pushplan.geometry.object_ways import blocked_places
 from pushplan.motion.collision import footprint, obstacles
 from pushplan.planners.rearrangement.placing.contact import (
     MARGIN,
@@ -62,8 +63,13 @@ class PlacingScene:
 
     @cached_property
     def places(self) -> IntArray:
-        """(K,) the place of each object by its number in the goal, -1 for those without one."""
-        return self.goal.assigned(self.movables.ids, self.poses)
+        """(K,) the place of each object by its number in the goal, -1 for those without one.
+
+        One that is in something static counts as none.
+        """
+        found = self.goal.assigned(self.movables.ids, self.poses)
+        found[np.isin(self.movables.ids, list(blocked_places(self.world)))] = -1
+        return found
 
     @cached_property
     def done(self) -> BoolArray:
@@ -72,8 +78,8 @@ class PlacingScene:
 
     @property
     def left(self) -> list[int]:
-        """Indices of the objects that are not at their places."""
-        found: list[int] = np.flatnonzero(~self.done).tolist()
+        """Indices of the objects that are not at their places, but could be."""
+        found: list[int] = np.flatnonzero(~self.done & (self.places >= 0)).tolist()
         return found
 
     @cached_property
