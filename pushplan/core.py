@@ -58,8 +58,8 @@ __all__ = [
 ]
 
 
-for _room in vars(_core).values():
-    for _kind in vars(_room).values() if isinstance(_room, ModuleType) else ():
+for _room in filter(lambda one: isinstance(one, ModuleType), vars(_core).values()):
+    for _kind in vars(_room).values():
         if isinstance(_kind, type) and not issubclass(_kind, Enum):
             copyreg.pickle(_kind, refuse_copy)
 copyreg.pickle(pushing.BoxContact, lambda one: (type(one), one.numbers))

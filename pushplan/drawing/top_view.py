@@ -143,7 +143,9 @@ def view_bounds(world: World, size_px: int, view: float | None) -> Bounds:
     high = box[2:].copy()
     sides = high - low
     axis = int(np.argmax(sides))
-    length = math.inf if view is None else number("view", view, low=0.0, open_low=True)
+    length = math.inf
+    if view is not None:
+        length = number("view", view, low=0.0, open_low=True)
     if length < sides[axis]:
         start = float(world.robot_pose[axis]) - 0.5 * length
         start = min(max(start, float(low[axis])), float(high[axis]) - length)

@@ -33,8 +33,9 @@ def check_start(world: World, *, overlaps: bool = False) -> None:
     if found:
         found.sort(reverse=True)
         named = ", ".join(f"{pair} by {depth:.2g} m" for depth, pair in found[:_NAMED])
-        more = f" and {len(found) - _NAMED} more" if len(found) > _NAMED else ""
-        warnings.warn(f"the start has overlaps: {named}{more}", StartWarning, stacklevel=3)
+        if len(found) > _NAMED:
+            named += f" and {len(found) - _NAMED} more"
+        warnings.warn(f"the start has overlaps: {named}", StartWarning, stacklevel=3)
 
 
 def _overlaps(world: World) -> list[tuple[float, str]]:

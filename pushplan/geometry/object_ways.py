@@ -60,7 +60,9 @@ def blocked_places(world: World) -> dict[int, float]:
     where the goal is not one of `ObjectGoals`.
     """
     found: dict[int, float] = {}
-    goal, objects, static = world.goal, world.movables, world.static
+    goal = world.goal
+    objects = world.movables
+    static = world.static
     if not isinstance(goal, ObjectGoals):
         return found
     for k, place in enumerate(goal.assigned(objects.ids, objects.poses).tolist()):

@@ -81,9 +81,13 @@ def observing(reads: Reads) -> Iterator[None]:
         _observers[:] = [one for one in _observers if one is not observer]
         if not _observers:
             os._Environ.__getitem__ = _environment_item  # type: ignore[method-assign]
-        is_copy = seen.keys() >= {f"${name}" for name in os.environ} - _written
+        variables = {name for name in seen if name[0] == "$"}
+        if variables >= {f"${name}" for name in os.environ} - _written:  # a copy of all of them
+            ignored = _written | variables
+        else:
+            ignored = _written - variables
         for name, known in seen.items():
-            if not is_copy if name[0] == "$" else name not in _written and version(name) == known:
+            if name not in ignored and (name in variables or version(name) == known):
                 reads[name] = _read[name] = known
         if reads is kept:
             for _, outer in _observers:

@@ -77,7 +77,9 @@ def polyline_status(world: World, plan: Plan) -> PlanStatus:
         return PlanStatus.PATH_ONLY
     if blocked_pose(world, poses) is not None:
         return PlanStatus.PATH_ONLY
-    return PlanStatus.SOLVED if _arrives(world, poses[-1]) else PlanStatus.APPROXIMATE
+    if _arrives(world, poses[-1]):
+        return PlanStatus.SOLVED
+    return PlanStatus.APPROXIMATE
 
 
 def _arrives(world: World, pose: FloatArray) -> bool:
@@ -126,7 +128,9 @@ def polyline_result(
     goal = world.navigation_goal
     if isinstance(goal, GoalPose) and not goal.reached_by(plan.poses[-1]):
         plan = _ended_at(world, fitting(world, goal) or goal, plan, spacing) or plan
-    first = call.elapsed if _arrives(world, plan.poses[-1]) else math.nan
+    first = math.nan
+    if _arrives(world, plan.poses[-1]):
+        first = call.elapsed
     return call.result(polyline_status(world, plan), plan, first, iterations)
 
 

@@ -215,7 +215,9 @@ def _grid(message: Any, frame: str | None) -> tuple[IntArray, float, FloatArray]
     height = int(message.info.height)
     width = int(message.info.width)
     data = message.data
-    cells = np.asarray(memoryview(data) if isinstance(data, bytes | bytearray) else data)
+    if isinstance(data, bytes | bytearray):
+        data = memoryview(data)
+    cells = np.asarray(data)
     odd = cells
     if cells.dtype.kind in "iu":
         odd = cells[(cells < -1) | ((cells > 100) & (cells != _UNKNOWN))]

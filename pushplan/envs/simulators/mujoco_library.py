@@ -19,12 +19,13 @@ def no_opengl(cause: object, otherwise: str = "") -> MissingDependencyError:
     """
     given = os.environ.get("MUJOCO_GL", "")
     kind = given.strip().lower()
+    asked = "that draws without a display"
     remedies = []
     if packages := _PACKAGES.get(kind or "egl"):
         remedies.append(f"install it (Debian: apt-get install {packages})")
     if given:
+        asked = f"by MUJOCO_GL={given}"
         remedies.append(f"unset MUJOCO_GL{'' if kind == 'egl' else ' or set it to egl'}")
-    asked = f"by MUJOCO_GL={given}" if given else "that draws without a display"
     return MissingDependencyError(
         f"MuJoCo finds no OpenGL {asked}: {', or '.join(remedies)}{otherwise} ({cause})"
     )

@@ -177,7 +177,9 @@ def verdict_table(verdicts: Sequence[Verdict]) -> Table:
             if one.count > 1:
                 change += f"\n[{scale * one.low:+.3g}, {scale * one.high:+.3g}]"
         more = f"\n{one.needed} needed" if one.needed else ""
-        count = f"{one.count}" if one.count == one.known else f"{one.count} of {one.known}"
+        count = f"{one.count}"
+        if one.count != one.known:
+            count += f" of {one.known}"
         count += "" if one.paired else "\nnot paired"
         means = [f"{value:.4g}" for value in (one.old, one.new)]
         cells.append((str(one.rule), one.policy, *means, change, count, one.verdict + more))

@@ -13,10 +13,9 @@ from importlib import metadata
 from typing import Any
 
 from pushplan.envs.registry import SIMULATORS, TASKS
-from pushplan.evaluation.run.job_limits import WORKER_VARIABLE
+from pushplan.evaluation.run.job_limits import THREAD_VARIABLES, WORKER_VARIABLE
 from pushplan.evaluation.run.jobs import MOST_READS, BatchStoppedError, Job, JobSettings, job_id
 from pushplan.evaluation.run.policy_specs import PolicySpec, described
-from pushplan.evaluation.run.worker import THREAD_VARIABLES
 from pushplan.evaluation.store.provenance import PACKAGES, versions
 from pushplan.evaluation.store.source_digests import (
     counted,
@@ -104,7 +103,9 @@ def _of_policy(spec: PolicySpec) -> tuple[dict[str, Any], dict[str, str]]:
     with contextlib.suppress(TypeError):
         if isinstance(spec.source, str):
             policy |= {"options": _plain(spec.options), "source": spec.source}
-    libraries = _OF_SB3 if str(spec.source).startswith("sb3:") else imported_by(counted)
+    libraries = imported_by(counted)
+    if str(spec.source).startswith("sb3:"):
+        libraries = _OF_SB3
     others = libraries - {*PACKAGES, *sys.stdlib_module_names, "pushplan"}
     packages = sorted({name for module in others for name in _distributions().get(module, ())})
     return policy, {name: metadata.version(name) for name in packages}

@@ -17,6 +17,15 @@ MEMORY_MB = 4000.0
 """Memory of a worker beyond which a job fails, unless something else is asked for [MB]."""
 WORKER_VARIABLE = "PUSHPLAN_WORKER"
 """Set in the environment of a worker process."""
+THREAD_VARIABLES = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "NUMEXPR_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+    "NUMBA_NUM_THREADS",
+)
+"""Set to 1 in a worker: parallel workers that each use all cores slow each other down."""
 
 
 class EpisodeTimeout(BaseException):

@@ -126,8 +126,10 @@ def _with_data(jobs: Sequence[Job], stored: Sequence[StoredResult]) -> list[Job]
         chosen[code] = max(valid, key=lambda data: len(valid[data]), default=json.dumps(now))
     found = []
     for job in jobs:
-        data = json.loads(chosen.get(_users_code(job, job.spec or {}), "{}"))
-        found.append(replace(job, spec={**(job.spec or {}), "data": data}) if data else job)
+        spec = job.spec or {}
+        if data := json.loads(chosen.get(_users_code(job, spec), "{}")):
+            job = replace(job, spec={**spec, "data": data})
+        found.append(job)
     return found
 
 

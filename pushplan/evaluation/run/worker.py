@@ -28,16 +28,6 @@ from pushplan.world import InvalidInputError
 _DIE_WITH_OWNER = 1  # PR_SET_PDEATHSIG of Linux, however the owner ends
 _ADOPT_ORPHANS = 36  # PR_SET_CHILD_SUBREAPER: what a policy leaves behind can still be found
 
-THREAD_VARIABLES = (
-    "OMP_NUM_THREADS",
-    "OPENBLAS_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "NUMEXPR_NUM_THREADS",
-    "VECLIB_MAXIMUM_THREADS",
-    "NUMBA_NUM_THREADS",
-)
-"""Set to 1 in a worker: parallel workers that each use all cores slow each other down."""
-
 
 @dataclass(frozen=True)
 class WorkerSetup:

@@ -143,8 +143,10 @@ class Placer:
         self, scene: PlacingScene, stop: Stop | None
     ) -> PlaceChoice | Legs | FloatArray | None:
         """The next push, or the way to the robot's own goal."""
+        if not scene.left and scene.goal.robot is None:
+            return None
         if not scene.left:
-            return None if scene.goal.robot is None else way_to(scene, scene.robot_goal)
+            return way_to(scene, scene.robot_goal)
         check = None if stop is None else stop.start()
         pushes = PlacePushes(scene, self._history, check)
         thorough = PlacingScene(scene.world, scene.friction, thorough=True)
