@@ -16,7 +16,7 @@ _LEAST_NOISE = 1e-4  # standard deviation of a corner [radii]
 _FIRST_NOISE = 0.03  # the same before a second sighting [radii]
 _SPREAD = 0.15  # of a heading, besides what the filter says [rad]
 _LASTING = 0.02  # how long an acceleration lasts [s]
-_SPEEDING = 0.5  # for how long an object may have accelerated before its first sighting [s]
+_SPEEDING = 0.2  # for how long an object may have accelerated before its first sighting [s]
 _GOES_ON = 0.5  # time for which an unseen object moves on as before [s]
 _COASTING = 0.2  # time constant with which it comes to rest then [s]
 
@@ -30,20 +30,23 @@ class Axis:
         value: first observation of the quantity.
         variance: of the first observation.
         acceleration: standard deviation of the acceleration [units/s²].
+        highest: standard deviation of the rate at the first observation [units/s].
     """
 
-    def __init__(self, value: complex, variance: float, acceleration: float) -> None:
-        self._acceleration = acceleration
+    def __init__(
+        self, value: complex, variance: float, acceleration: float, highest: float = 0.0
+    ) -> None:
+        self._highest = highest
         self._noise = acceleration**2 * _LASTING
         self.restart(value, variance)
 
     def restart(self, value: complex, variance: float) -> None:
-        """Know a value, and of the rate only how high it may be."""
+        """Know a value, and of the rate only its standard deviation."""
         self.value = value
         self.rate = 0j
         self._variance = variance
         self._shared = 0.0
-        self._of_rate = (_SPEEDING * self._acceleration) ** 2
+        self._of_rate = self._highest**2
 
     def expected(self, seconds: float) -> tuple[complex, complex, float]:
         """Value, rate and variance of the value after a time without observations [s]."""
@@ -104,7 +107,9 @@ class Track:
         self.seen_at = time
         away = self.shape - self.shape.mean()
         of_heading = self.variance / float(np.vdot(away, away).real)
-        self._place = Axis(first.centre, self.variance / len(self.shape), accelerations[0])
+        fast = _SPEEDING * accelerations[0]
+        self._place = Axis(first.centre, self.variance / len(self.shape), accelerations[0], fast)
+        # A high turn rate would let a square spin by a quarter of a turn between two snapshots.
         self._direction = Axis(0.0, of_heading, accelerations[1])
         self.predict(time)
 
