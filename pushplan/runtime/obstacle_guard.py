@@ -20,6 +20,7 @@ from pushplan.world.checks import FloatArray
 from pushplan.world.outline import flatten, outline_boxes
 
 _CLEARANCE = 0.02  # kept from what is new, beside the noise [circumscribed radii]
+_BETWEEN = 0.003  # by which the robot may come nearer between two poses of a path [radii]
 _RESUMED = 1.5  # times the clearance where the robot has stood, so that noise moves it nowhere
 _DEEPER = 1e-6  # by how much the robot may get nearer to what it is too near to [radii]
 _SLOWER = (1.0, 0.75, 0.5, 0.25, 0.1)
@@ -103,9 +104,10 @@ class ObstacleGuard:
             self._side = 0
             return twist, ""
         grown = self._clearance(world) * (_RESUMED if self._stands else 1.0)
+        least = _BETWEEN * robot.circumscribed_radius
         closeness = [
             _Closeness(footprint(robot, margin), world.robot_pose, outlines)
-            for margin, outlines in ((grown, new), (0.0, known))
+            for margin, outlines in ((grown, new), (least, known))
             if outlines
         ]
         for fraction in _SLOWER if robot.can_stop else (1.0,):
