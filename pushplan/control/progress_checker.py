@@ -69,20 +69,18 @@ class PoseProgressChecker(ProgressChecker[FloatArray]):
     Args:
         robot: its size, speeds and accelerations.
         patience: another time without progress that is allowed [s].
-        place_noise: standard deviation of the places that are seen [m].
-        heading_noise: standard deviation of the headings that are seen [rad].
+        noise: standard deviations of what is seen, places [m] and headings [rad].
     """
 
     def __init__(
         self,
         robot: RobotModel,
         patience: float | None = None,
-        place_noise: float = 0.0,
-        heading_noise: float = 0.0,
+        noise: tuple[float, float] = (0.0, 0.0),
     ) -> None:
         size = robot.circumscribed_radius
-        self._distance = _MOVED * size + _SURE * place_noise
-        self._turn = _MOVED + _SURE * heading_noise
+        self._distance = _MOVED * size + _SURE * noise[0]
+        self._turn = _MOVED + _SURE * noise[1]
         going = size / robot.max_speed + robot.max_speed / robot.max_acceleration
         turning = _TURN / robot.max_turn_rate + robot.max_turn_rate / robot.max_turn_acceleration
         if patience is None:

@@ -48,31 +48,8 @@ def add_arc(
         poses.append(np.array(geometry.arc_step(ahead, length / steps, turn / steps)) - aside)
 
 
-def braked_twist(robot: RobotModel, twist: Twist, seconds: float, *, on_curve: bool) -> Twist:
-    """The velocity after a robot has braked for a while.
-
-    Args:
-        robot: one that can stop.
-        twist: what it drives.
-        seconds: for how long it brakes.
-        on_curve: keep the curvature of its path, where the robot can; else the turn ends soonest.
-    """
-    braked = ramp_twist(robot, twist, 0.0, 0.0, seconds)
-    speed, _ = twist.course
-    if not on_curve or speed == 0.0:
-        return braked
-    turn = twist.angular * braked.course[0] / speed
-    return ramp_twist(robot, twist, braked.linear, turn, seconds, braked.lateral)
-
-
 def stopping_path(
-    robot: RobotModel,
-    pose: FloatArray,
-    twist: Twist,
-    held: float,
-    period: float,
-    *,
-    on_curve: bool = False,
+    robot: RobotModel, pose: FloatArray, twist: Twist, held: float, period: float
 ) -> FloatArray:
     """The path of a robot that holds a velocity for a while, and then brakes.
 
@@ -82,7 +59,6 @@ def stopping_path(
         twist: what it drives.
         held: for how long it does [s].
         period: time between two commands [s].
-        on_curve: see `braked_twist`.
 
     Returns:
         (N, 3) poses up to where it stands, the first one included.
@@ -94,6 +70,6 @@ def stopping_path(
     poses = [np.array(pose, dtype=np.float64)]
     while twist.linear or twist.angular or twist.lateral:
         add_twist(poses, twist, held, robot.circumscribed_radius)
-        twist = braked_twist(robot, twist, step, on_curve=on_curve)
+        twist = ramp_twist(robot, twist, 0.0, 0.0, step)
         held = step
     return np.array(poses)

@@ -121,9 +121,7 @@ class ObjectTracker:
     @property
     def unseen_s(self) -> FloatArray:
         """(K,) for how long each object has not been seen [s]."""
-        return frozen(
-            np.array([track.time - track.seen_at for track in self._present], dtype=float)
-        )
+        return frozen(np.array([one.time - one.seen_at for one in self._present], dtype=float))
 
     def update(
         self, polygons: Sequence[ArrayLike], stamp: float, ids: ArrayLike | None = None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +10,7 @@ import shapely
 
 from pushplan.control import waiting_twist
 from pushplan.control.limits import ramp_twist
-from pushplan.control.stopping import add_arc, braked_twist, stopping_path
+from pushplan.control.stopping import add_arc, stopping_path
 from pushplan.core import motion as core
 from pushplan.motion.collision import footprint, obstacles
 from pushplan.runtime.noise_allowance import NoiseAllowance
@@ -28,7 +27,6 @@ _SLOWER = (1.0, 0.75, 0.5, 0.25, 0.1)
 _HELD = 2.0  # for how long each command may be driven before the next one comes [periods]
 _TURNING_STEPS = 25  # in which a turn begins at most
 _FINE = 0.25  # distance between poses of circles, in that of other paths
-_OFF_PLAN = 0.5  # distance from its plan at which a robot is no longer on it [radii]
 _MOVED = 4.0  # distance from its place at which something fixed may be seen [clearances]
 _ANYWHERE = StaticMap.build(bounds=(-1e9, -1e9, 1e9, 1e9))
 
@@ -38,10 +36,9 @@ class ObstacleGuard:
 
     From what is new, which was not so in each world since the start, the robot keeps a clearance.
     What was known at the start it may pass as closely as its plan does, which was made for it. A
-    robot that is too near already may drive wherever it comes no nearer.
-
-    One that cannot stop has to be able to drive a circle, or what its plan does next, from where
-    it is. What was known at the start counts for it only while it is off the plan that it shows.
+    robot that is too near already may drive wherever it comes no nearer. One that cannot stop has
+    to be able to drive a circle, or what its plan does next, from where it is; what was known at
+    the start is left to its policy, since no circle fits between walls.
 
     Args:
         allowance: noise of the poses.
@@ -98,7 +95,7 @@ class ObstacleGuard:
         """
         robot = world.robot
         twist = ramp_twist(robot, before, wanted.linear, wanted.angular, held, wanted.lateral)
-        new, known = self._near(world, before, twist, plan)
+        new, known = self._near(world, before, twist)
         if not new and not known:
             self._stands = False
             self._side = 0
@@ -126,37 +123,28 @@ class ObstacleGuard:
                     if fraction == 1.0:
                         return slower, ""
                     return slower, _reason(world, new, known, "slows down")
-        self._stands = robot.can_stop
-        if robot.can_stop:
-            reason = _reason(world, new, known, "stops")
-            return braked_twist(robot, before, held, on_curve=self._side != 0), reason
         rest = waiting_twist(world.with_fixed_as_static())
         turn = self._side * robot.max_turn_rate or rest.angular
-        reason = _reason(world, new, known, "turns away")
+        self._stands = robot.can_stop
+        reason = _reason(world, new, known, "stops" if robot.can_stop else "turns away")
         return ramp_twist(robot, before, rest.linear, turn, held), reason
 
-    def _paths(
-        self, world: World, twist: Twist, plan: Plan | None
-    ) -> Iterator[tuple[int, FloatArray]]:
-        """Give the paths (N, 3) of a command, each with the side on which it turns.
+    def _paths(self, world: World, twist: Twist, plan: Plan | None) -> list[tuple[int, FloatArray]]:
+        """Return the paths (N, 3) of a command, each with the side on which it turns.
 
-        One to a stand, straight (0) or on its curve (1), or, where the robot cannot stop, around
-        the circle of either side, and one that goes on as the plan does, if that is long enough.
+        One to a stand, or, where the robot cannot stop, around the circle of either side, and one
+        that goes on as the plan does, if that is long enough.
         """
         robot = world.robot
-        pose = world.robot_pose
         held = _HELD * self._period
         if robot.can_stop:
-            yield 0, stopping_path(robot, pose, twist, held, self._period)
-            if twist.angular and twist.course[0]:
-                yield 1, stopping_path(robot, pose, twist, held, self._period, on_curve=True)
-            return
-        for side in (1, -1):
-            yield side, self._circle(world, twist, side)
+            return [(0, stopping_path(robot, world.robot_pose, twist, held, self._period))]
+        paths = [(side, self._circle(world, twist, side)) for side in (1, -1)]
         if plan is not None:
             planned = self._planned(world, twist, plan)
             if planned is not None:
-                yield 0, planned
+                paths.append((0, planned))
+        return paths
 
     def _planned(self, world: World, twist: Twist, plan: Plan) -> FloatArray | None:
         """(N, 3) poses of a command, and of what the plan does next.
@@ -197,39 +185,30 @@ class ObstacleGuard:
         return np.array(poses)
 
     def _near(
-        self, world: World, before: Twist, twist: Twist, plan: Plan | None
+        self, world: World, before: Twist, twist: Twist
     ) -> tuple[list[FloatArray], list[FloatArray]]:
         """Outlines within reach of what is new, and of what was known at the start."""
         robot = world.robot
-        pose = world.robot_pose
-        static = world.static
         objects = world.movables
-        held = np.flatnonzero(objects.fixed).tolist()
-        is_new = [(int(objects.ids[k]) in self._new_fixed, objects.parts_world(k)) for k in held]
-        fixed = [(new, part) for new, parts in is_new for part in parts]
-        boxes = static.boxes
-        if fixed:
-            boxes = np.concatenate([boxes, outline_boxes(*flatten([part for _, part in fixed]))])
-        if not len(boxes):
-            return [], []
+        outlines = list(world.static.convex_parts)
+        is_new = self._is_new.tolist()
+        boxes = world.static.boxes
+        for k in np.flatnonzero(objects.fixed).tolist():
+            parts = objects.parts_world(k)
+            outlines += parts
+            is_new += [int(objects.ids[k]) in self._new_fixed] * len(parts)
+            boxes = np.concatenate([boxes, outline_boxes(*flatten(parts))])
         speed = max(abs(before.course[0]), abs(twist.course[0]))
         reach = robot.circumscribed_radius + 2.0 * _RESUMED * self._clearance(world)
         reach += speed * (_HELD * self._period + speed / robot.max_acceleration)
         if not robot.can_stop:
             reach += math.tau * robot.turning_radius
-        low = pose[:2] - reach
-        high = pose[:2] + reach
-        near = ((boxes[:, 2:] >= low) & (boxes[:, :2] <= high)).all(axis=1)
-        leaves_known = not robot.can_stop and (plan is None or _is_on(plan, world))
-        found: tuple[list[FloatArray], list[FloatArray]] = ([], [])
-        for k in np.flatnonzero(near).tolist():
-            if k < len(self._is_new):
-                new, part = bool(self._is_new[k]), static.convex_parts[k]
-            else:
-                new, part = fixed[k - len(self._is_new)]
-            if new or not leaves_known:
-                found[0 if new else 1].append(part)
-        return found
+        place = world.robot_pose[:2]
+        near = (boxes[:, 2:] >= place - reach) & (boxes[:, :2] <= place + reach)
+        found = np.flatnonzero(near.all(axis=1)).tolist()
+        new = [outlines[k] for k in found if is_new[k]]
+        known = [outlines[k] for k in found if not is_new[k] and robot.can_stop]
+        return new, known
 
     def _clearance(self, world: World) -> float:
         reach = world.robot.circumscribed_radius
@@ -272,12 +251,6 @@ def _fixed(world: World) -> dict[int, FloatArray]:
     objects = world.movables
     held = np.flatnonzero(objects.fixed)
     return dict(zip(objects.ids[held].tolist(), objects.poses[held], strict=True))
-
-
-def _is_on(plan: Plan, world: World) -> bool:
-    """Return True if a robot is on its plan."""
-    away = np.hypot(*(plan.poses[:, :2] - world.robot_pose[:2]).T)
-    return bool(away.min() <= _OFF_PLAN * world.robot.circumscribed_radius)
 
 
 def _reason(world: World, new: list[FloatArray], known: list[FloatArray], what: str) -> str:

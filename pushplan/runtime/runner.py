@@ -219,7 +219,7 @@ class Runner:
     def _restart(self, world: World) -> None:
         """Begin anew with a snapshot: nothing that was seen, sent or planned before it counts."""
         self._estimator.reset()
-        self._progress = PoseProgressChecker(world.robot, _STUCK, *self._seen_noise)
+        self._progress = PoseProgressChecker(world.robot, _STUCK, self._seen_noise)
         self._told = 0.0
         """Time for which the robot was told to move [s]."""
         self._told_at = -math.inf
