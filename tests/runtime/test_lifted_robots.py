@@ -80,7 +80,7 @@ def hits(driven: DrivenRobot) -> float:
 @pytest.mark.parametrize(
     "name", ["kinodynamic-rrt", pytest.param("push-aware", marks=pytest.mark.slow)]
 )
-@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seed", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_a_robot_that_is_carried_aside_hits_no_wall_of_its_map(name: str, seed: int) -> None:
     lifted = 0
     for k in range(0, 16, 3):
