@@ -17,6 +17,7 @@ _LEAST_TOLD = 0.1
 """Commanded motion below which nothing is concluded [circumscribed radii]."""
 _MOVED = 0.25  # that counts as getting on [circumscribed radii], or [rad]
 _TURN = 0.5  # for which a robot that gets on is given time [rad]
+_SURE = 6.0  # standard deviations by which noise moves nothing
 _RESPONSE = 0.5  # that delays and slow motors may take [s]
 
 Seen = TypeVar("Seen")
@@ -72,17 +73,28 @@ class PoseProgressChecker(ProgressChecker[FloatArray]):
 
     Args:
         robot: its size, speeds and accelerations.
+        patience: another time without progress that is allowed [s].
+        noise: standard deviations of what is seen, places [m] and headings [rad].
     """
 
-    def __init__(self, robot: RobotModel) -> None:
-        self._size = robot.circumscribed_radius
-        going = self._size / robot.max_speed + robot.max_speed / robot.max_acceleration
+    def __init__(
+        self,
+        robot: RobotModel,
+        patience: float | None = None,
+        noise: tuple[float, float] = (0.0, 0.0),
+    ) -> None:
+        size = robot.circumscribed_radius
+        self._distance = _MOVED * size + _SURE * noise[0]
+        self._turn = _MOVED + _SURE * noise[1]
+        going = size / robot.max_speed + robot.max_speed / robot.max_acceleration
         turning = _TURN / robot.max_turn_rate + robot.max_turn_rate / robot.max_turn_acceleration
-        super().__init__(self._has_moved, going + turning + _RESPONSE)
+        if patience is None:
+            patience = going + turning + _RESPONSE
+        super().__init__(self._has_moved, patience)
 
     def _has_moved(self, before: FloatArray, pose: FloatArray) -> bool:
         turn = math.remainder(float(pose[2] - before[2]), math.tau)
-        return math.dist(pose[:2], before[:2]) >= _MOVED * self._size or abs(turn) >= _MOVED
+        return math.dist(pose[:2], before[:2]) >= self._distance or abs(turn) >= self._turn
 
 
 class StallChecker:

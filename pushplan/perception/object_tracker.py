@@ -27,6 +27,7 @@ from pushplan.world.outline import (
 from pushplan.world.outline_repair import outline_parts
 
 _SAME_SIZE = 0.2  # relative difference of sizes up to which a jump may be of the same object
+_REMEMBERED = 1.0  # for how long the identity of an unseen object is known at least [s]
 _SOLID = 0.9  # area over that of the hull from which on noise may have made the dents
 
 
@@ -47,16 +48,19 @@ class ObjectTracker:
     that shape, filtered by how far the fit is off. A heading goes on from the one before, so that
     a square that turns by 90 degrees in a second has turned, and starts at 0.
 
-    An object that is not seen stays where it comes to rest, for ``keep`` seconds. One that is seen
-    outside every gate has jumped, or is new, once it was seen there ``confirm`` times one after
-    another; until then the sighting is doubted. In the first snapshot all is believed.
+    An object that is not seen moves on for half a second, comes to rest, and stays there until it
+    has been unseen for ``keep`` seconds. Empty snapshots and missing ones are alike. An object
+    that is seen outside every gate has jumped, or is new, once it was seen there ``confirm`` times
+    one after another; until then the sighting is doubted. In the first snapshot, and after nothing
+    was seen for ``keep`` seconds, all is believed.
 
     Args:
         gate: greatest distance from the expected place to a sighting [radii of the object],
             besides three standard deviations of that place.
         keep: how long an object is kept that is not seen [s].
         confirm: how many sightings it takes to believe a jump or a new object.
-        acceleration: standard deviation of accelerations of objects [m/s²]; less smooths more.
+        acceleration: standard deviation of accelerations of objects, each of which lasts a
+            fiftieth of a second [m/s²]; less smooths more.
         turn_acceleration: the same of turning [rad/s²].
         density: of objects, for their masses [kg/m²].
         wheeled: they stand on casters.
@@ -103,7 +107,12 @@ class ObjectTracker:
         """Forget everything; the next snapshot begins anew, at any time."""
         self.ignored = self.flat = 0
         self.time: float | None = None
+        self._seen_at: float | None = None
+        """Time of the newest snapshot that was not empty [s]."""
         self._tracks: list[Track] = []
+        """Every object whose identity is remembered."""
+        self._present: list[Track] = []
+        """Those that are believed to be there."""
         self._candidates: list[NewSighting] = []
         self._next = 0
         self.movables = Movables.empty()
@@ -112,7 +121,7 @@ class ObjectTracker:
     @property
     def unseen_s(self) -> FloatArray:
         """(K,) for how long each object has not been seen [s]."""
-        return frozen(np.array([track.time - track.seen_at for track in self._tracks], dtype=float))
+        return frozen(np.array([one.time - one.seen_at for one in self._present], dtype=float))
 
     def update(
         self, polygons: Sequence[ArrayLike], stamp: float, ids: ArrayLike | None = None
@@ -149,26 +158,32 @@ class ObjectTracker:
             return self.movables
         sightings = sightings_of(points, labels)
         self.flat += len(points) - len(sightings)
-        first = self.time is None
+        remembered = max(self.keep, _REMEMBERED)
         self.time = stamp
+        self._tracks = [one for one in self._tracks if stamp - one.seen_at <= remembered]
         for track in self._tracks:
             track.predict(stamp)
-        rest = self._match(sightings)
-        if first:
-            for sighting in rest:
-                self._add(sighting)
-        else:
-            self._doubt(rest)
-        self._tracks = [one for one in self._tracks if stamp - one.seen_at <= self.keep]
+        if sightings:
+            rest = self._match(sightings)
+            if self._seen_at is None or stamp - self._seen_at > remembered:
+                self._candidates = []
+                for sighting in rest:
+                    self._add(sighting)
+            else:
+                self._doubt(rest)
+            self._seen_at = stamp
+        # in the order of `movables`, to whose end an object comes back
+        self._tracks.sort(key=lambda one: one.label not in self._shown)
+        self._present = [one for one in self._tracks if stamp - one.seen_at <= self.keep]
         self.movables = self._collected()
         return self.movables
 
     def _match(self, sightings: list[Sighting]) -> list[Sighting]:
         """Give the sightings within the gates to their tracks; return the others."""
-        if not sightings or not self._tracks:
+        if not self._tracks:
             return sightings
         tracks = self._tracks
-        deviations = [math.sqrt(one.place.variance) for one in tracks]
+        deviations = [math.sqrt(one.place_variance) for one in tracks]
         gates = self.gate * np.array([one.radius for one in tracks]) + 3.0 * np.array(deviations)
         if sightings[0].label is None:
             pairs = list(
@@ -245,8 +260,8 @@ class ObjectTracker:
 
     def _collected(self) -> Movables:
         """The tracks as `Movables`; outlines are made anew where a mean has become better."""
-        shown = {one.label: (len(one.shape), one.sightings.bit_length()) for one in self._tracks}
-        better = [one for one in self._tracks if self._shown.get(one.label) != shown[one.label]]
+        shown = {one.label: (len(one.shape), one.sightings.bit_length()) for one in self._present}
+        better = [one for one in self._present if self._shown.get(one.label) != shown[one.label]]
         gone = [label for label in self._shown if label not in shown]
         movables = self.movables
         self._shown = shown
@@ -276,7 +291,7 @@ class ObjectTracker:
         """(K, 3) poses and twists of the centroids."""
         states = [
             (one.centre, one.velocity, one.middle, one.heading, one.turn_rate)
-            for one in self._tracks
+            for one in self._present
         ]
         columns = np.array(states, dtype=complex).reshape(-1, 5).T.copy()
         centres, velocities, middles, headings, rates = columns

@@ -15,48 +15,72 @@ _MOST_SIGHTINGS = 100  # over so many a shape is averaged
 _LEAST_NOISE = 1e-4  # standard deviation of a corner [radii]
 _FIRST_NOISE = 0.03  # the same before a second sighting [radii]
 _SPREAD = 0.15  # of a heading, besides what the filter says [rad]
-_COASTING = 0.3  # time constant with which an unseen object comes to rest [s]
+_LASTING = 0.02  # how long an acceleration lasts [s]
+_SPEEDING = 0.2  # for how long an object may have accelerated before its first sighting [s]
+_GOES_ON = 0.5  # time for which an unseen object moves on as before [s]
+_COASTING = 0.2  # time constant with which it comes to rest then [s]
 
 
 class Axis:
     """Kalman filter of a quantity and its rate, driven by white accelerations.
 
+    The state is that of the last observation. Predictions depend on the time since then alone.
+
     Args:
-        acceleration: standard deviation of the acceleration [units/s²].
+        value: first observation of the quantity.
         variance: of the first observation.
+        acceleration: standard deviation of the acceleration [units/s²].
+        highest: standard deviation of the rate at the first observation [units/s].
     """
 
-    def __init__(self, acceleration: float, variance: float) -> None:
-        self.acceleration = acceleration
-        self.restart(variance)
+    def __init__(
+        self, value: complex, variance: float, acceleration: float, highest: float = 0.0
+    ) -> None:
+        self._highest = highest
+        self._noise = acceleration**2 * _LASTING
+        self.restart(value, variance)
 
-    def restart(self, variance: float) -> None:
-        """Know a place and that the object rests, or nearly."""
-        self.variance = variance
-        self.shared = 0.0
-        self.of_rate = 0.0
+    def restart(self, value: complex, variance: float) -> None:
+        """Know a value, and of the rate only its standard deviation."""
+        self.value = value
+        self.rate = 0j
+        self._variance = variance
+        self._shared = 0.0
+        self._of_rate = self._highest**2
 
-    def predict(self, step: float) -> None:
-        """Pass some time [s]."""
-        q = self.acceleration**2
-        self.variance += step * (2.0 * self.shared + step * (self.of_rate + q * step * step / 4.0))
-        self.shared += step * (self.of_rate + q * step * step / 2.0)
-        self.of_rate += q * step * step
+    def expected(self, seconds: float) -> tuple[complex, complex, float]:
+        """Value, rate and variance of the value after a time without observations [s]."""
+        steady = min(seconds, _GOES_ON)
+        slowing = seconds - steady
+        stays = math.exp(-slowing / _COASTING)
+        reach = _COASTING * (1.0 - stays)
+        noise = steady * (steady**2 / 3.0 + reach * (steady + reach))
+        noise += _COASTING**2 * (slowing - 2.0 * reach) + 0.5 * _COASTING**3 * (1.0 - stays**2)
+        reach += steady
+        variance = self._variance + reach * (2.0 * self._shared + reach * self._of_rate)
+        return self.value + reach * self.rate, stays * self.rate, variance + self._noise * noise
 
-    def slow(self, stays: float) -> None:
-        """Come nearer to rest: only a part of the rate stays."""
-        self.shared *= stays
-        self.of_rate *= stays * stays
+    def correct(self, value: complex, variance: float, seconds: float) -> None:
+        """Take an observation with its variance, a time after the last one [s].
 
-    def correct(self, variance: float) -> tuple[float, float]:
-        """Gains for the quantity and for its rate [1/s], given the variance of an observation."""
-        total = self.variance + variance
-        gain = self.variance / total
-        rate_gain = self.shared / total
-        self.of_rate -= rate_gain * self.shared
-        self.shared -= gain * self.shared
-        self.variance -= gain * self.variance
-        return gain, rate_gain
+        An object that was unseen may have moved on all the time, so its rate is not taken to decay.
+        """
+        q = self._noise
+        expected = self.value + seconds * self.rate
+        ahead = self._shared + seconds * self._of_rate
+        before = self._variance + seconds * (self._shared + ahead) + q * seconds**3 / 3.0
+        shared = ahead + q * seconds**2 / 2.0
+        of_rate = self._of_rate + q * seconds
+        total = before + variance
+        gain = before / total
+        # The mean rate since the last observation bounds the correction. A higher gain, which is
+        # best for white accelerations, overshoots where an object stops at once.
+        rate_gain = shared / total if seconds * shared <= before else gain / seconds
+        self._variance = (1.0 - gain) * before
+        self._shared = (1.0 - gain) * shared
+        self._of_rate = of_rate - rate_gain * (2.0 * shared - rate_gain * total)
+        self.value = expected + gain * (value - expected)
+        self.rate += rate_gain * (value - expected)
 
 
 class Track:
@@ -74,35 +98,29 @@ class Track:
     ) -> None:
         self.label = label
         self.area = first.area
-        self.centre = first.centre
-        self.heading = 0.0
         self.middle = 0j  # centroid of the shape's hull, in the frame of the body
-        self.velocity = 0j
-        self.turn_rate = 0.0
         self.shape = first.contour - first.centre
         self.radius = float(np.abs(self.shape).max())
         self.variance = (_FIRST_NOISE * self.radius) ** 2
         self.sightings = 1
         self.votes = 1
-        self.seen_at = self.time = time
-        self.place = Axis(accelerations[0], self.variance / len(self.shape))
+        self.seen_at = time
         away = self.shape - self.shape.mean()
-        self.direction = Axis(accelerations[1], self.variance / float(np.vdot(away, away).real))
+        of_heading = self.variance / float(np.vdot(away, away).real)
+        fast = _SPEEDING * accelerations[0]
+        self._place = Axis(first.centre, self.variance / len(self.shape), accelerations[0], fast)
+        # A high turn rate would let a square spin by a quarter of a turn between two snapshots.
+        self._direction = Axis(0.0, of_heading, accelerations[1])
+        self.predict(time)
 
     def predict(self, time: float) -> None:
-        """Move on as before; an object that was not seen lately comes to rest."""
-        step = time - self.time
-        if self.time > self.seen_at:
-            stays = math.exp(-step / _COASTING)
-            self.velocity *= stays
-            self.turn_rate *= stays
-            self.place.slow(stays)
-            self.direction.slow(stays)
-        self.centre += step * self.velocity
-        self.heading += step * self.turn_rate
-        self.place.predict(step)
-        self.direction.predict(step)
+        """Expect the object where it is at a time [s]; if not seen lately, it comes to rest."""
         self.time = time
+        unseen = time - self.seen_at
+        self.centre, self.velocity, self.place_variance = self._place.expected(unseen)
+        heading, turn_rate, self.heading_variance = self._direction.expected(unseen)
+        self.heading = heading.real
+        self.turn_rate = turn_rate.real
 
     def see(
         self,
@@ -122,22 +140,18 @@ class Track:
             part = 1.0 / min(max(self.sightings - 1, 1), 20)
             self.variance += part * (max(variance, least) - self.variance)
         noise = max(self.variance, variance)
-        gain, rate_gain = self.place.correct(noise / points)
-        away = centre - self.centre
-        self.centre += gain * away
-        self.velocity += rate_gain * away
-        gain, rate_gain = self.direction.correct(noise / moment)
-        self.heading += gain * turn
-        self.turn_rate += rate_gain * turn
+        seconds = self.time - self.seen_at
+        self._place.correct(centre, noise / points, seconds)
+        self._direction.correct(self.heading + turn, noise / moment, seconds)
         self.seen_at = self.time
+        self.predict(self.time)
 
     def jump(self, centre: complex) -> None:
         """Expect the object elsewhere, where it lies in any direction."""
-        self.velocity = 0j
-        self.turn_rate = 0.0
-        self.centre = centre
-        self.place.restart(self.radius**2)
-        self.direction.restart(math.pi**2)
+        self._place.restart(centre, self.radius**2)
+        self._direction.restart(self.heading, math.pi**2)
+        self.seen_at = self.time
+        self.predict(self.time)
 
     def _average(self, seen: Contour, centre: complex, heading: float, order: int) -> None:
         """Bring the shape nearer to what is seen; the number of corners is a majority vote."""
@@ -173,7 +187,7 @@ def see_all(tracks: Sequence[Track], contours: Sequence[Contour]) -> None:
             np.array(seen_there),
             np.array([one.heading for one in some]),
             np.array([one.variance for one in some]),
-            np.array([math.sqrt(_SPREAD**2 + one.direction.variance) for one in some]),
+            np.array([math.sqrt(_SPREAD**2 + one.heading_variance) for one in some]),
             sampled=not corners,
         )
         for k, *fit in zip(members, *(values.tolist() for values in found), strict=True):

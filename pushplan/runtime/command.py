@@ -17,7 +17,9 @@ class CommandStatus(enum.StrEnum):
     WAITING = "waiting"
     """The robot stands until a plan is there."""
     BLOCKED = "blocked"
-    """Slowed down or stopped, because something new is in the way, or closes it."""
+    """Slowed down or stopped, because something static or fixed is in the way."""
+    STUCK = "stuck"
+    """Command of the policy, but the robot has not moved for 5 s though it was told to."""
     DONE = "done"
     """The robot, or every object, is surely where the goal wants it; final until `start`."""
     STALE = "stale"
@@ -36,7 +38,7 @@ class Command:
         time: for which it was asked, by the clock of the worlds [s].
         twist: the velocity to drive; within speeds, turn rate and accelerations of the robot.
         status: what it is for.
-        reason: why the robot is being stopped, or waits; empty where it is driven.
+        reason: why the robot is being stopped, waits or is stuck; empty where it is driven.
         plan: what is followed; None for policies without one.
         plan_age: time since that plan was taken up [s].
         world_age: time since the newest world was seen [s].

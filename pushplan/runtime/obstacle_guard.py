@@ -1,4 +1,4 @@
-"""`ObstacleGuard`: the robot stops before what was not there when it set out."""
+"""`ObstacleGuard`: the robot stops before what is static or fixed."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import shapely
 
 from pushplan.control import waiting_twist
 from pushplan.control.limits import ramp_twist
@@ -18,6 +19,7 @@ from pushplan.world.checks import FloatArray
 from pushplan.world.outline import flatten, outline_boxes
 
 _CLEARANCE = 0.02  # kept from what is new, beside the noise [circumscribed radii]
+_BETWEEN = 0.003  # by which the robot may come nearer between two poses of a path [radii]
 _RESUMED = 1.5  # times the clearance where the robot has stood, so that noise moves it nowhere
 _DEEPER = 1e-6  # by how much the robot may get nearer to what it is too near to [radii]
 _SLOWER = (1.0, 0.75, 0.5, 0.25, 0.1)
@@ -30,12 +32,13 @@ _ANYWHERE = StaticMap.build(bounds=(-1e9, -1e9, 1e9, 1e9))
 
 
 class ObstacleGuard:
-    """Looks at each command: the robot has to be able to stop before what is new.
+    """Looks at each command: the robot has to be able to stop before what is static or fixed.
 
-    New is what is static, or held not to move, and was not so in each world since the start. All
-    else is left to the policy, which knows it: a guard of it would hinder pushes along walls. A
+    From what is new, which was not so in each world since the start, the robot keeps a clearance.
+    What was known at the start it may pass as closely as its plan does, which was made for it. A
     robot that is too near already may drive wherever it comes no nearer. One that cannot stop has
-    to be able to drive a circle, or what its plan does next, from where it is.
+    to be able to drive a circle, or what its plan does next, from where it is; what was known at
+    the start is left to its policy, since no circle fits between walls.
 
     Args:
         allowance: noise of the poses.
@@ -51,7 +54,6 @@ class ObstacleGuard:
         self._static: StaticMap | None = None
         self._known = {part.tobytes() for part in world.static.convex_parts}
         self._known_fixed = _fixed(world)
-        self._new: list[FloatArray] = []
         self._stands = False
         self._side = 0  # side with room for a robot that cannot stop: 1 left, -1 right, 0 unknown
         self.observe(world)
@@ -64,9 +66,9 @@ class ObstacleGuard:
         """
         if world.static is not self._static:
             self._static = world.static
-            parts = {part.tobytes(): part for part in world.static.convex_parts}
-            self._known &= parts.keys()
-            self._new = [part for key, part in parts.items() if key not in self._known]
+            keys = [part.tobytes() for part in world.static.convex_parts]
+            self._known &= set(keys)
+            self._is_new = np.array([key not in self._known for key in keys], dtype=np.bool_)
         clearance = self._clearance(world)
         fixed = _fixed(world)
         self._known_fixed = {
@@ -75,7 +77,7 @@ class ObstacleGuard:
             if label in fixed and math.dist(pose[:2], fixed[label][:2]) <= _MOVED * clearance
         }
         self._new_fixed = fixed.keys() - self._known_fixed.keys()
-        if not self._new and not self._new_fixed:
+        if not self._is_new.any() and not self._new_fixed:
             return world
         return replace(world, margin=max(world.margin, 2.0 * clearance))
 
@@ -93,13 +95,18 @@ class ObstacleGuard:
         """
         robot = world.robot
         twist = ramp_twist(robot, before, wanted.linear, wanted.angular, held, wanted.lateral)
-        near = self._near(world, twist, plan)
-        if not near:
+        new, known = self._near(world, before, twist)
+        if not new and not known:
             self._stands = False
             self._side = 0
             return twist, ""
         grown = self._clearance(world) * (_RESUMED if self._stands else 1.0)
-        closeness = _Closeness(footprint(robot, grown), world.robot_pose, near)
+        least = _BETWEEN * robot.circumscribed_radius
+        closeness = [
+            _Closeness(footprint(robot, margin), world.robot_pose, outlines)
+            for margin, outlines in ((grown, new), (least, known))
+            if outlines
+        ]
         for fraction in _SLOWER if robot.can_stop else (1.0,):
             slower = ramp_twist(
                 robot,
@@ -110,16 +117,16 @@ class ObstacleGuard:
                 fraction * wanted.lateral,
             )
             for side, path in self._paths(world, slower, plan):
-                if closeness.allows(path):
+                if all(one.allows(path) for one in closeness):
                     self._stands = False
                     self._side = side
                     if fraction == 1.0:
                         return slower, ""
-                    return slower, _reason(world, near, "slows down")
+                    return slower, _reason(world, new, known, "slows down")
         rest = waiting_twist(world.with_fixed_as_static())
         turn = self._side * robot.max_turn_rate or rest.angular
         self._stands = robot.can_stop
-        reason = _reason(world, near, "stops" if robot.can_stop else "turns away")
+        reason = _reason(world, new, known, "stops" if robot.can_stop else "turns away")
         return ramp_twist(robot, before, rest.linear, turn, held), reason
 
     def _paths(self, world: World, twist: Twist, plan: Plan | None) -> list[tuple[int, FloatArray]]:
@@ -177,21 +184,31 @@ class ObstacleGuard:
         add_arc(poses, robot.turning_radius * math.tau, side * math.tau, fine)
         return np.array(poses)
 
-    def _near(self, world: World, twist: Twist, plan: Plan | None) -> list[FloatArray]:
-        """Outlines of what is new and within reach."""
-        if not self._new and not self._new_fixed:
-            return []
+    def _near(
+        self, world: World, before: Twist, twist: Twist
+    ) -> tuple[list[FloatArray], list[FloatArray]]:
+        """Outlines within reach of what is new, and of what was known at the start."""
+        robot = world.robot
         objects = world.movables
-        chosen = np.flatnonzero(np.isin(objects.ids, list(self._new_fixed))).tolist()
-        held = [part for k in chosen for part in objects.parts_world(k)]
-        outlines = [*self._new, *held]
-        boxes = outline_boxes(*flatten(outlines))
-        path = np.concatenate([path for _, path in self._paths(world, twist, plan)])
-        reach = world.robot.circumscribed_radius + 2.0 * _RESUMED * self._clearance(world)
-        low = path[:, :2].min(axis=0) - reach
-        high = path[:, :2].max(axis=0) + reach
-        near = ((boxes[:, 2:] >= low) & (boxes[:, :2] <= high)).all(axis=1)
-        return [part for part, is_near in zip(outlines, near, strict=True) if is_near]
+        outlines = list(world.static.convex_parts)
+        is_new = self._is_new.tolist()
+        boxes = world.static.boxes
+        for k in np.flatnonzero(objects.fixed).tolist():
+            parts = objects.parts_world(k)
+            outlines += parts
+            is_new += [int(objects.ids[k]) in self._new_fixed] * len(parts)
+            boxes = np.concatenate([boxes, outline_boxes(*flatten(parts))])
+        speed = max(abs(before.course[0]), abs(twist.course[0]))
+        reach = robot.circumscribed_radius + 2.0 * _RESUMED * self._clearance(world)
+        reach += speed * (_HELD * self._period + speed / robot.max_acceleration)
+        if not robot.can_stop:
+            reach += math.tau * robot.turning_radius
+        place = world.robot_pose[:2]
+        near = (boxes[:, 2:] >= place - reach) & (boxes[:, :2] <= place + reach)
+        found = np.flatnonzero(near.all(axis=1)).tolist()
+        new = [outlines[k] for k in found if is_new[k]]
+        known = [outlines[k] for k in found if not is_new[k] and robot.can_stop]
+        return new, known
 
     def _clearance(self, world: World) -> float:
         reach = world.robot.circumscribed_radius
@@ -209,6 +226,9 @@ class _Closeness:
 
     def __init__(self, shape: core.Footprint, pose: FloatArray, outlines: list[FloatArray]) -> None:
         self._too_near: list[tuple[core.CollisionChecker, float]] = []
+        self._clear = core.CollisionChecker(shape, obstacles(_ANYWHERE, tuple(outlines)))
+        if self._clear.is_free(pose):
+            return
         clear = []
         for outline in outlines:
             one = core.CollisionChecker(shape, obstacles(_ANYWHERE, (outline,)))
@@ -233,9 +253,12 @@ def _fixed(world: World) -> dict[int, FloatArray]:
     return dict(zip(objects.ids[held].tolist(), objects.poses[held], strict=True))
 
 
-def _reason(world: World, near: list[FloatArray], what: str) -> str:
+def _reason(world: World, new: list[FloatArray], known: list[FloatArray], what: str) -> str:
     """The robot does something because of the nearest outline."""
-    at = world.robot_pose[:2]
-    middles = [part.mean(axis=0) for part in near]
-    x, y = min(middles, key=lambda middle: math.dist(at, middle))
-    return f"the robot {what} because something new is in its way, at ({x:.2f}, {y:.2f})"
+    at = shapely.Point(world.robot_pose[:2])
+    near = [*new, *known]
+    away = shapely.distance(shapely.polygons([shapely.linearrings(part) for part in near]), at)
+    k = int(np.argmin(away))
+    x, y = near[k].mean(axis=0)
+    kind = "new" if k < len(new) else "static"
+    return f"the robot {what} because something {kind} is in its way, at ({x:.2f}, {y:.2f})"

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.control import waiting_twist
+from pushplan.control import PoseProgressChecker, waiting_twist
 from pushplan.control.limits import driven_twist
 from pushplan.errors import describe, refuse_copy
 from pushplan.interaction import ContactParameters
@@ -50,6 +50,9 @@ _SMOOTHING = 0.3  # gain of the filter of noisy poses
 _RETRY = 0.25  # time after a failure in which the policy is not asked [s]
 _BLIND = 60.0  # for how long a robot that is to continue does so without a world [s]
 _SURE = 5  # snapshots in which the goal has to be reached where one of them may err
+_STUCK = 4.5  # time after which a robot that has not moved is stuck, so that it says so in 5 s [s]
+_TOLD = 0.1  # speed from which on it was told to move [circumscribed radii/s]
+_LULL = 1.0  # pause between commands to move that counts as one of them [s]
 _WAITING = 99  # snapshots that are kept for the next command, besides the newest
 
 
@@ -141,6 +144,7 @@ class Runner:
         if observer_gain is None:
             observer_gain = _SMOOTHING if noise.any() else 1.0
         gain = number("observer_gain", observer_gain, low=0.0, high=1.0, open_low=True)
+        self._seen_noise = place, float(noise[2])
         self.policy = drivable(policy, self.max_age, contact)
         self._believed = max(self.max_age, _BLIND if self.on_stale == "continue" else 0.0)
         self._estimator = StateEstimator(delay, gain, noise, self._believed)
@@ -217,6 +221,10 @@ class Runner:
     def _restart(self, world: World) -> None:
         """Begin anew with a snapshot: nothing that was seen, sent or planned before it counts."""
         self._estimator.reset()
+        self._progress = PoseProgressChecker(world.robot, _STUCK, self._seen_noise)
+        self._told = 0.0
+        """Time for which the robot was told to move [s]."""
+        self._told_at = -math.inf
         self._memory = ObjectMemory(self.keep_unseen)
         self._observe(self._memory.complete(world, world))
         self._drop_plans()
@@ -364,6 +372,10 @@ class Runner:
         if obstacle and status in (CommandStatus.DRIVING, CommandStatus.WAITING):
             status = CommandStatus.BLOCKED
             reason = obstacle
+        idle = self._idle(newest, twist, at, held)
+        if status is CommandStatus.DRIVING and idle > _STUCK:
+            status = CommandStatus.STUCK
+            reason = f"the robot has not moved for {idle:.0f} s though it was told to"
         self._estimator.sent(at, twist)
         if plan is not self._plan:
             self._plan = plan
@@ -387,6 +399,16 @@ class Runner:
         self.status = status
         self._at = at
         return command
+
+    def _idle(self, seen: World, twist: Twist, now: float, held: float) -> float:
+        """For how long the robot was told to move, and did not [s]."""
+        size = seen.robot.circumscribed_radius
+        if abs(twist.course[0]) + size * abs(twist.angular) >= _TOLD * size:
+            self._told_at = now
+        if now - self._told_at <= _LULL:
+            self._told += held
+        self._progress.update(seen.robot_pose, self._told)
+        return self._progress.idle
 
     def _read_clock(self, now: float) -> tuple[float, str]:
         """The time of the episode, which never goes back, and what is wrong with the clock."""

@@ -305,12 +305,13 @@ def test_a_robot_that_stands_at_something_new_drives_away_from_it_and_no_nearer(
     assert last.status is CommandStatus.DRIVING and driven.world.robot_pose[0] < 1.3
 
 
-def test_what_was_there_at_the_start_is_left_to_the_policy() -> None:
-    """A guard of it would hinder pushes along walls."""
+def test_what_was_there_at_the_start_stops_a_robot_that_does_not_look() -> None:
     block = square_at(3.0, 3.0)
     driven = DrivenRobot(Ahead(), adding(room(), block))
-    assert driven.drive(60).status is CommandStatus.DRIVING
-    assert driven.overlap(block) > 0.0
+    last = driven.drive(80)
+    assert driven.overlap(block) == 0.0
+    assert last.status is CommandStatus.BLOCKED and "something static" in last.reason
+    assert driven.world.robot_pose[0] > 2.4  # up to it, without a clearance
 
 
 def test_what_comes_beside_the_plan_is_left_to_the_policy() -> None:
