@@ -209,11 +209,13 @@ def _check_crossings(name: str, shapes: Any) -> None:
     rings = shapely.get_rings(shapely.get_parts(shapes))
     points, ring = shapely.get_coordinates(rings, return_index=True)
     begins = np.flatnonzero(ring[1:] == ring[:-1])
+    count = len(begins)
+    most = _CROSSINGS[0] + _CROSSINGS[1] * count
+    if count * count <= most:
+        return
     a, b = points[begins], points[begins + 1]
     edges = shapely.linestrings(np.stack([a, b], axis=1))
     tree = shapely.STRtree(edges)
-    count = len(edges)
-    most = _CROSSINGS[0] + _CROSSINGS[1] * count
     near = crossings = 0
     for first in range(0, count, _EDGES_AT_ONCE):
         i, j = tree.query(edges[first : first + _EDGES_AT_ONCE])
@@ -323,4 +325,4 @@ def _merged(triangles: FloatArray, budget: float, sliver: float) -> list[FloatAr
     least = 1e-9 * (boxes[:, 2:] - boxes[:, :2]).max(axis=1) ** 2
     kept = hulls[areas > np.maximum(least, sliver * areas.sum())]
     # Shapely's hulls are clockwise, and their first corner is there twice
-    return convex_outlines("part", [shapely.get_coordinates(hull)[:0:-1] for hull in kept])
+    return convex_outlines("part", [shapely.get_coordinates(hull)[-2::-1] for hull in kept])
