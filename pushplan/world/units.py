@@ -73,10 +73,12 @@ def _outside(world: World, cropped: bool) -> Iterator[str]:
     if not cropped:
         ends = static.segments.reshape(-1, 2, 2)
         named["static.polygons"] = outline_boxes(*flatten(static.polygons))
-        reach = static.radii[:, None]
-        named["static.segments"] = np.hstack([ends.min(axis=1) - reach, ends.max(axis=1) + reach])
+        thick = static.radii[:, None]
+        named["static.segments"] = np.hstack([ends.min(axis=1) - thick, ends.max(axis=1) + thick])
+    reach = 2.0 * world.robot.circumscribed_radius  # sensors see a little beyond the bounds
+    low, high = static.bounds.reshape(2, 2) + [[-reach], [reach]]
     for key, boxes in named.items():
-        away = (boxes[:, :2] > static.bounds[2:]) | (boxes[:, 2:] < static.bounds[:2])
+        away = (boxes[:, :2] > high) | (boxes[:, 2:] < low)
         found = boxes[away.any(axis=1)]
         if len(found):
             yield (
