@@ -19,10 +19,6 @@ LARGEST_M = 1e70
 """Greatest coordinate [m]: its fourth power is finite still."""
 
 
-class NotConvexError(InvalidInputError):
-    """An outline is not convex, by more than rounding."""
-
-
 def signed_area(corners: FloatArray) -> float:
     """Shoelace area of a polygon [m²], positive when counter-clockwise.
 
@@ -128,7 +124,7 @@ def _without_dents(name: str, ring: FloatArray, rounding: float) -> FloatArray:
         or not shapely.dwithin(rim, shapely.points(ring[~spans]), rounding).all()
         or not _is_well_formed(ring[spans])
     ):
-        raise NotConvexError(
+        raise InvalidInputError(
             f"{name} must be convex: split it into convex parts first, got {short(ring.tolist())}"
         )
     spanning: FloatArray = ring[spans]

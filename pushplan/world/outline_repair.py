@@ -21,7 +21,6 @@ from pushplan.world.outline import (
     convex_outlines,
     flatten,
     listed,
-    well_formed,
 )
 
 MOST_CHANGE = 0.01
@@ -120,26 +119,15 @@ def cut_outlines(
     name: str, shapes: Sequence[Any], called: Callable[[int], str], smooth: bool = False
 ) -> list[ConvexParts]:
     """The convex parts of each of some shapes; see `pushplan.world.convex_shapes.shapes_of`."""
-    named: list[list[tuple[str, Any]]] = []  # of each shape its outlines, with what they are called
-    for i, shape in enumerate(listed(name, shapes)):
-        if _is_list_of_outlines(shape):
-            named.append([(f"{called(i)}, part {j}", each) for j, each in enumerate(shape)])
-        else:
-            named.append([(called(i), shape)])
-    convex = iter(_convex_ones([outline for outlines in named for _, outline in outlines]))
     found = []
     changed: list[OutlineParts] = []
-    for outlines in named:
-        parts: list[FloatArray] = []
-        for label, outline in outlines:
-            if next(convex):
-                parts.append(frozen(outline.copy()))
-                continue
-            cut = outline_parts(label, outline, smooth=smooth)
-            parts += cut.parts
-            if cut.repaired or cut.change > _SLIVER:
-                changed.append(cut)
-        found.append(tuple(parts))
+    for i, shape in enumerate(listed(name, shapes)):
+        outlines = {called(i): shape}
+        if _is_list_of_outlines(shape):
+            outlines = {f"{called(i)}, part {j}": each for j, each in enumerate(shape)}
+        cuts = [outline_parts(label, each, smooth=smooth) for label, each in outlines.items()]
+        changed += [cut for cut in cuts if cut.repaired or cut.change > _SLIVER]
+        found.append(tuple(part for cut in cuts for part in cut.parts))
     if changed:
         most = max(each.change for each in changed)
         warnings.warn(
@@ -149,21 +137,6 @@ def cut_outlines(
             stacklevel=4,
         )
     return found
-
-
-def _convex_ones(outlines: list[Any]) -> list[bool]:
-    """Find the outlines that are arrays and need no repair, at a quick look at all of them."""
-    plain = [
-        isinstance(one, np.ndarray)
-        and one.dtype == np.float64
-        and one.ndim == 2
-        and one.shape[1] == 2
-        and len(one) >= 3
-        for one in outlines
-    ]
-    good = np.array(plain, dtype=bool)
-    good[good] = well_formed(*flatten([outlines[i] for i in np.flatnonzero(good).tolist()]))
-    return [bool(one) for one in good]
 
 
 def _is_list_of_outlines(shape: Any) -> bool:

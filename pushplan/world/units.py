@@ -6,10 +6,8 @@ import warnings
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from pushplan.errors import InvalidInputError
-from pushplan.world.checks import FloatArray
 from pushplan.world.goals import GoalDisc, GoalPose, ObjectGoals
 from pushplan.world.outline import flatten, outline_boxes
 from pushplan.world.scene import World
@@ -53,56 +51,50 @@ def check_length(world: World, length: float) -> None:
         warnings.warn(UnitsWarning(doubt), stacklevel=1)
 
 
-def _length(text: str, length: float, world: World) -> list[str]:
-    size = 2.0 * world.robot.circumscribed_radius
-    if length <= _MOST_LENGTHS * size:
-        return []
-    return [
-        f"{text.format(f'{length:,.6g} m')}, {length / size:,.0f} robot lengths: are these metres?"
-    ]
+def _length(text: str, length: float, world: World) -> Iterator[str]:
+    times = length / (2.0 * world.robot.circumscribed_radius)
+    if times > _MOST_LENGTHS:
+        yield f"{text.format(f'{length:,.6g} m')}, {times:,.0f} robot lengths: are these metres?"
 
 
 def _outside(world: World, cropped: bool) -> Iterator[str]:
     static = world.static
-    objects = world.movables
-    corners = objects.vertices_world
-    named = {"movables": outline_boxes(corners, objects.offsets)}
-    named["robot.parts"] = outline_boxes(*flatten([np.concatenate(world.robot_outline_world())]))
+    robot = outline_boxes(*flatten([np.concatenate(world.robot_outline_world())]))
+    movables = outline_boxes(world.movables.vertices_world, world.movables.offsets)
+    named = {"robot.parts": robot, "movables": movables}
     if isinstance(world.goal, GoalDisc):
         named["goal.center"] = np.tile(world.goal.center, 2)[None]
     if not cropped:
-        ends = static.segments.reshape(-1, 2, 2)
-        named["static.polygons"] = outline_boxes(*flatten(static.polygons))
-        thick = static.radii[:, None]
-        named["static.segments"] = np.hstack([ends.min(axis=1) - thick, ends.max(axis=1) + thick])
+        count = len(static.polygons)
+        named["static.polygons"] = static.boxes[:count]
+        named["static.segments"] = static.boxes[count:]
     reach = 2.0 * world.robot.circumscribed_radius  # sensors see a little beyond the bounds
-    low, high = static.bounds.reshape(2, 2) + [[-reach], [reach]]
+    low = static.bounds[:2] - reach
+    high = static.bounds[2:] + reach
     for key, boxes in named.items():
-        away = (boxes[:, :2] > high) | (boxes[:, 2:] < low)
-        found = boxes[away.any(axis=1)]
+        found = boxes[((boxes[:, :2] > high) | (boxes[:, 2:] < low)).any(axis=1)]
         if len(found):
             yield (
                 f"{key} has {len(found)} of {len(boxes)} outside static.bounds "
-                f"{static.bounds.tolist()}, the first from {found[0, :2].round(3).tolist()} to "
-                f"{found[0, 2:].round(3).tolist()}: are these metres?"
+                f"{static.bounds.tolist()}, the first in {found[0].round(3).tolist()}: "
+                "are these metres?"
             )
 
 
 def _angles(world: World) -> Iterator[str]:
-    assert world.robot_twist is not None
     goal = world.goal
-    named: dict[str, ArrayLike] = {
-        "robot.pose[2] [rad]": world.robot_pose[2],
-        "robot.twist[2] [rad/s]": world.robot_twist[2],
-        "robot.max_turn_rate [rad/s]": world.robot.max_turn_rate,
-        "movables.pose[2] [rad]": world.movables.poses[:, 2],
-        "movables.twist[2] [rad/s]": world.movables.twists[:, 2],
-        "goal.heading [rad]": goal.heading if isinstance(goal, GoalPose) else 0.0,
-        "goal.places.pose[2] [rad]": goal.poses[:, 2] if isinstance(goal, ObjectGoals) else 0.0,
+    objects = world.movables
+    named = {
+        "robot.pose": [world.robot_pose],
+        "robot.twist": [world.robot_twist],
+        "robot.max_turn_rate": [[world.robot.max_turn_rate]],
+        "movables.pose": objects.poses,
+        "movables.twist": objects.twists,
+        "goal.heading": [[goal.heading]] if isinstance(goal, GoalPose) else [],
+        "goal.places.pose": goal.poses if isinstance(goal, ObjectGoals) else [],
     }
-    for key, values in named.items():
-        angles: FloatArray = np.atleast_1d(values)
-        k = int(np.abs(angles).argmax()) if len(angles) else 0
-        if len(angles) and abs(angles[k]) > _MOST_TURNS * 2.0 * np.pi:
+    for key, rows in named.items():
+        angles = np.array([row[-1] for row in rows])
+        for k in np.flatnonzero(np.abs(angles) > _MOST_TURNS * 2.0 * np.pi)[:1].tolist():
             where = key.replace("movables", f"movables[{k}]").replace("places", f"places[{k}]")
-            yield f"{where} is {angles[k]:g}, more than {_MOST_TURNS} turns: are these degrees?"
+            yield f"{where} has {angles[k]:g} rad, over {_MOST_TURNS} turns: are these degrees?"

@@ -33,18 +33,22 @@ WORLD = {
 PLACE = {"id": 0, "pose": [3, 3, 90.0], "radius": 0.1}
 MISTAKES = {
     "static.polygons has 1 of 1": ("static", "polygons", [[[600, 2400], [900, 2400], [900, 2600]]]),
-    r"\[600.0, 2400.0\]": ("static", "polygons", [[[600, 2400], [900, 2400], [900, 2600]]]),
+    r"\[600.0, 2400.0, 900.0, 2600.0\]": (
+        "static",
+        "polygons",
+        [[[600, 2400], [900, 2400], [900, 2600]]],
+    ),
     "static.segments has 1 of 1": ("static", "segments", [{"from": [0, 5000], "to": [5000, 5000]}]),
     "movables has 1 of 1": ("movables", 0, "pose", [3000, 3000, 0]),
     "goal.center has 1 of 1": ("goal", "center", [4000, 4000]),
     "robot.parts has 1 of 1": ("robot", "pose", [1000, 1000, 0]),
-    r"robot.pose\[2\] \[rad\] is 90": ("robot", "pose", [1, 1, 90.0]),
-    r"robot.twist\[2\] \[rad/s\] is 45": ("robot", "twist", [0, 0, 45.0]),
-    "robot.max_turn_rate .* is 162.7": ("robot", "max_turn_rate", 162.7),
-    r"movables\[0\].pose\[2\] .* is -45": ("movables", 0, "pose", [3, 3, -45.0]),
-    r"movables\[0\].twist\[2\] .* is 30": ("movables", 0, "twist", [0, 0, 30.0]),
-    "goal.heading .* is 180": ("goal", "heading", 180.0),
-    r"goal.places\[0\].pose\[2\] .* is 90": ("goal", {"kind": "objects", "places": [PLACE]}),
+    "robot.pose has 90 rad": ("robot", "pose", [1, 1, 90.0]),
+    "robot.twist has 45 rad": ("robot", "twist", [0, 0, 45.0]),
+    "robot.max_turn_rate has 162.7 rad": ("robot", "max_turn_rate", 162.7),
+    r"movables\[0\].pose has -45 rad": ("movables", 0, "pose", [3, 3, -45.0]),
+    r"movables\[0\].twist has 30 rad": ("movables", 0, "twist", [0, 0, 30.0]),
+    "goal.heading has 180 rad": ("goal", "heading", 180.0),
+    r"goal.places\[0\].pose has 90 rad": ("goal", {"kind": "objects", "places": [PLACE]}),
     r"goal.center is 4,242.64 m from robot.pose, 15,000 robot lengths": ("mm",),
 }
 
