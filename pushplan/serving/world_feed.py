@@ -58,7 +58,8 @@ class WorldFeed:
                 data = {**data, "robot": {**self._robot, **robot}}
         world = world_from_dict(data)
         check_scale(world)
-        check_units(world)
+        if self._world is None:  # the units of a client do not change
+            check_units(world)
         return self._keep(world, world.movables)
 
     def next(self, message: Mapping[str, Any]) -> World:

@@ -197,7 +197,7 @@ def _check_crossings(name: str, shapes: Any) -> None:
         i, j = i[i < j], j[i < j]
         apart = _side(a[i], b[i], a[j]) * _side(a[i], b[i], b[j]) < 0.0
         apart &= _side(a[j], b[j], a[i]) * _side(a[j], b[j], b[i]) < 0.0
-        crossings += np.count_nonzero(apart)
+        crossings += int(np.count_nonzero(apart))
         if crossings > most or near > _NEAR_PAIRS * count:
             raise InvalidInputError(
                 f"{name} with {count:,} corners is too tangled: at least {crossings:,} crossings, "
@@ -279,7 +279,8 @@ def _smoothed(whole: Any, size: float) -> Any:
 def _triangles(shape: Any) -> FloatArray:
     """(T, 3, 2) corners [m] of triangles that make up a shape."""
     pieces = shapely.get_parts(shapely.constrained_delaunay_triangles(shape))
-    return shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3]
+    triangles: FloatArray = shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3]
+    return triangles
 
 
 def _merged(triangles: FloatArray, budget: float, sliver: float) -> list[FloatArray]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -84,7 +85,7 @@ def _outside(world: World, cropped: bool) -> Iterator[str]:
 def _angles(world: World) -> Iterator[str]:
     goal = world.goal
     objects = world.movables
-    named = {
+    named: dict[str, Any] = {
         "robot.pose": [world.robot_pose],
         "robot.twist": [world.robot_twist],
         "robot.max_turn_rate": [[world.robot.max_turn_rate]],

@@ -13,7 +13,7 @@ from pushplan.evaluation import JobSettings
 from pushplan.scenarios import suite
 from pushplan.serving.world_feed import WorldFeed
 from pushplan.world import InvalidInputError, load_world
-from pushplan.world.units import UnitsWarning, check_units
+from pushplan.world.units import UnitsWarning, check_length, check_units
 
 WORLD = {
     "schema": "pushplan-world/1",
@@ -112,3 +112,13 @@ def test_commands_say_it_once_and_refuse_it_if_strict(tmp_path: Path, capsys) ->
         assert capsys.readouterr().err.count("note: ") == 1
         assert main([*command, "--strict"]) == 2
         assert "outside static.bounds [0.0, 0.0, 5.0, 5.0]" in capsys.readouterr().err
+
+
+def test_a_path_is_measured_by_the_robot(tmp_path: Path) -> None:
+    world = load_world(written(tmp_path))
+    longest = 2_000.0 * world.robot.circumscribed_radius
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_length(world, 0.99 * longest)
+    with pytest.warns(UnitsWarning, match="the path has a length of .* 1,010 robot lengths"):
+        check_length(world, 1.01 * longest)
