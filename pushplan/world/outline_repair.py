@@ -31,7 +31,8 @@ _CROSSINGS = (1_000, 2)
 """Most crossings of edges that are resolved, and more of them for each edge: each takes 2 kB."""
 _NEAR_PAIRS = 1_000
 """Most other edges, on average, whose boxes the box of an edge may meet: each pair costs 0.1 µs."""
-_EDGES_AT_ONCE = 16  # that are compared with all others
+_EDGES_AT_ONCE = 16
+"""Edges that are compared with all others before the counts are looked at."""
 _MANY_CORNERS = 2_000
 """Corners of an outline from which on smoothing bounds its change, and does not measure it."""
 _SMOOTHED = 0.003  # share of that for leaving out corners of outlines with many of them,
@@ -164,7 +165,7 @@ def disjoint_pieces(parts: ConvexParts) -> ConvexParts:
 
 def union_rings(parts: ConvexParts) -> tuple[FloatArray, ...]:
     """Outlines (N, 2) [m] of the union of some convex parts, those of its holes too."""
-    # a corner of one part may be off the edge of its neighbour by rounding
+    # A corner of one part may be off the edge of its neighbour by rounding.
     grid = _ROUNDING * float(np.ptp(np.concatenate(parts), axis=0).max())
     rings = shapely.get_rings(shapely.get_parts(_union(parts, grid)))
     return tuple(shapely.get_coordinates(ring)[:-1] for ring in rings)

@@ -14,7 +14,9 @@ from pushplan.world.outline import flatten, outline_boxes
 from pushplan.world.scene import World
 
 _MOST_TURNS = 2
+"""Greatest angle that raises no doubt [turns], and greatest turn rate [turns/s]."""
 _MOST_LENGTHS = 1_000
+"""Greatest length of a way that raises no doubt [robot lengths]."""
 
 
 class UnitsWarning(InvalidInputError, UserWarning):
@@ -43,7 +45,8 @@ def check_units(
         warning = UnitsWarning(f"{name}: {doubt}")
         if strict:
             raise warning
-        warnings.warn(warning, stacklevel=1)  # from one place, so that each text is shown once
+        # Python shows a text once for each place that warns, so this is the only one.
+        warnings.warn(warning, stacklevel=1)
 
 
 def check_length(world: World, length: float) -> None:
@@ -69,7 +72,8 @@ def _outside(world: World, cropped: bool) -> Iterator[str]:
         count = len(static.polygons)
         named["static.polygons"] = static.boxes[:count]
         named["static.segments"] = static.boxes[count:]
-    reach = 2.0 * world.robot.circumscribed_radius  # sensors see a little beyond the bounds
+    # Sensors see a little beyond the bounds.
+    reach = 2.0 * world.robot.circumscribed_radius
     low = static.bounds[:2] - reach
     high = static.bounds[2:] + reach
     for key, boxes in named.items():
