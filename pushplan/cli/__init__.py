@@ -74,6 +74,10 @@ def _run(arguments: Sequence[str]) -> int:
             os.environ[TRUST_VARIABLE] = "1"  # where worker processes see it too
         with warnings.catch_warnings():
             warnings.showwarning = _show_in_a_line
+            if getattr(options, "strict_units", False):
+                from pushplan.world.units import UnitsWarning
+
+                warnings.simplefilter("error", UnitsWarning)
             code: int = named(options.run)(options)
         sys.stdout.flush()  # a full disk or a closed pipe is reported here, or nowhere
         return code

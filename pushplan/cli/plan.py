@@ -30,6 +30,7 @@ def run(options: argparse.Namespace) -> int:
         stream,
     )
     from pushplan.world.checks import expect
+    from pushplan.world.units import check_length
 
     check_file(options.out)
     check_figure(options.render)
@@ -49,6 +50,8 @@ def run(options: argparse.Namespace) -> int:
         if spec.is_ours:
             raise
         raise PushplanError(f"planner {spec.label!r} failed: {describe(error)}") from error
+    if result.plan is not None:
+        check_length(world, result.plan.length)
     data = _as_dict(options, spec.label, result)
     if options.out:
         Path(options.out).write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")

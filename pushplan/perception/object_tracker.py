@@ -307,7 +307,7 @@ def _parts_of(ring: FloatArray, hull: FloatArray, area: float) -> ConvexParts:
     if signed_area(ring) > _SOLID * area:
         return (hull,)
     try:
-        return outline_parts("outline", ring).parts
+        return outline_parts("outline", ring, smooth=True).parts
     except InvalidInputError:  # noise has made it cross itself
         return (hull,)
 

@@ -200,7 +200,7 @@ _READERS = {".json": _read_json, ".npz": _read_npz, ".npy": _read_npy}
 
 
 def _floes(polygons: Sequence[Any], hull: bool) -> list[ConvexParts]:
-    floes = shapes_of("polygon", polygons)
+    floes = shapes_of("polygon", polygons, smooth=True)
     if not hull:
         return floes
     return [(hull_of(parts),) for parts in floes]

@@ -41,7 +41,7 @@ def roughened(
         The convex parts of each floe.
     """
     return [
-        outline_parts("floe", _rough_outline(rng, floe, roughness, mean_radius)).parts
+        outline_parts("floe", _rough_outline(rng, floe, roughness, mean_radius), smooth=True).parts
         for floe in floes
     ]
 

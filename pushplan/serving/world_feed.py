@@ -15,6 +15,7 @@ from pushplan.serving.scale import check_motion, check_scale, check_shapes
 from pushplan.world import InvalidInputError, Movables, SchemaError, World, world_from_dict
 from pushplan.world.checks import FloatArray, array
 from pushplan.world.stored.world_files import movables_from_list, robot_from_dict
+from pushplan.world.units import check_units
 
 MAX_OBJECTS = 20_000
 """Most objects that one client may make known."""
@@ -57,6 +58,8 @@ class WorldFeed:
                 data = {**data, "robot": {**self._robot, **robot}}
         world = world_from_dict(data)
         check_scale(world)
+        if self._world is None:  # the units of a client do not change
+            check_units(world)
         return self._keep(world, world.movables)
 
     def next(self, message: Mapping[str, Any]) -> World:

@@ -21,7 +21,11 @@ from pushplan.world.outline import (
 
 
 def shapes_of(
-    name: str, shapes: Sequence[Any], called: Callable[[int], str] | None = None
+    name: str,
+    shapes: Sequence[Any],
+    called: Callable[[int], str] | None = None,
+    *,
+    smooth: bool = False,
 ) -> list[ConvexParts]:
     """The convex parts of each of some shapes.
 
@@ -31,6 +35,7 @@ def shapes_of(
         name: of the shapes, for messages.
         shapes: of each the corners (N, 2) [m], a polygon of Shapely, or a list of such outlines.
         called: what messages call shape i; the name and i if None.
+        smooth: as in `pushplan.world.outline_repair.outline_parts`.
 
     Raises:
         InvalidInputError: as `pushplan.world.outline_repair.outline_parts`.
@@ -42,7 +47,7 @@ def shapes_of(
     except InvalidInputError:
         from pushplan.world.outline_repair import cut_outlines
 
-        return cut_outlines(name, shapes, called or (lambda i: f"{name} {i}"))
+        return cut_outlines(name, shapes, called or (lambda i: f"{name} {i}"), smooth)
 
 
 def _as_parts(shape: Any) -> tuple[Any, ...]:

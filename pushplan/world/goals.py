@@ -191,7 +191,8 @@ class ClearanceArea(_AreaGoal):
         edges = array("goal.open_edges", self.open_edges, (len(given),), dtype=np.bool_)
         if not np.array_equal(given, polygon):
             # of a repeated corner the last one is kept, so its edge is the one with a length
-            at = [np.flatnonzero((given == corner).all(axis=1))[-1] for corner in polygon]
+            last = {(x, y): i for i, (x, y) in enumerate(given.tolist())}
+            at = [last[x, y] for x, y in polygon.tolist()]
             turned = signed_area(given) < 0.0
             edges = frozen(edges[np.array(at) - (1 if turned else 0)])
         object.__setattr__(self, "polygon", polygon)

@@ -19,10 +19,6 @@ LARGEST_M = 1e70
 """Greatest coordinate [m]: its fourth power is finite still."""
 
 
-class NotConvexError(InvalidInputError):
-    """An outline is not convex, by more than rounding."""
-
-
 def signed_area(corners: FloatArray) -> float:
     """Shoelace area of a polygon [m²], positive when counter-clockwise.
 
@@ -114,19 +110,24 @@ def _without_dents(name: str, ring: FloatArray, rounding: float) -> FloatArray:
     import shapely
 
     hull = shapely.convex_hull(shapely.multipoints(ring))
-    points = shapely.points(ring)
     size = float(np.ptp(ring, axis=0).max())
     if hull.area <= 1e-9 * size * size:
         raise InvalidInputError(f"{name} must have an area, got {hull.area:g} m²")
-    depth = float(shapely.distance(points, hull.exterior).max())
     # a ring may cross itself though all corners lie on the hull: then it has another area
     lost = abs(hull.area - signed_area(ring))
-    corners = shapely.multipoints(hull.exterior.coords)
-    spanning: FloatArray = ring[shapely.distance(points, corners) == 0.0]
-    if depth > rounding or lost > rounding * hull.length or not _is_well_formed(spanning):
-        raise NotConvexError(
-            f"{name} must be convex: split it into convex parts first, got {ring.tolist()}"
+    corners = shapely.get_coordinates(hull).view(np.complex128)
+    spans = np.isin(np.ascontiguousarray(ring).view(np.complex128)[:, 0], corners)
+    rim = hull.exterior
+    shapely.prepare(rim)
+    if (
+        lost > rounding * hull.length
+        or not shapely.dwithin(rim, shapely.points(ring[~spans]), rounding).all()
+        or not _is_well_formed(ring[spans])
+    ):
+        raise InvalidInputError(
+            f"{name} must be convex: split it into convex parts first, got {short(ring.tolist())}"
         )
+    spanning: FloatArray = ring[spans]
     return spanning
 
 

@@ -20,15 +20,8 @@ from pushplan.world.checked_fields import (
     PositiveFloat,
 )
 from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, choice, frozen, number
-from pushplan.world.outline import (
-    ConvexParts,
-    NotConvexError,
-    convex_outline,
-    flatten,
-    grown_outline,
-    inscribed_radius,
-    signed_area,
-)
+from pushplan.world.convex_shapes import shapes_of
+from pushplan.world.outline import flatten, grown_outline, inscribed_radius, signed_area
 
 
 class Drive(enum.StrEnum):
@@ -95,7 +88,9 @@ class RobotModel(ArrayRecord, CheckedFields):
             raise InvalidInputError("robot.parts must be a non-empty list of convex outlines")
         super().__post_init__()
         put = object.__setattr__
-        cut = [_convex_parts(f"robot.parts[{i}]", part) for i, part in enumerate(self.parts)]
+        cut = shapes_of("robot.parts", self.parts, lambda i: f"robot.parts[{i}]")
+        # the largest first, as it may be a chassis
+        cut = [tuple(sorted(pieces, key=signed_area, reverse=True)) for pieces in cut]
         put(self, "parts", tuple(part for pieces in cut for part in pieces))
         put(self, "drive", Drive(choice("drive", self.drive, [d.value for d in Drive])))
         if self.drive is Drive.CONSTANT_SPEED:
@@ -195,14 +190,3 @@ class RobotModel(ArrayRecord, CheckedFields):
     def can_stop(self) -> bool:
         """True if the robot may stand."""
         return self.drive is not Drive.CONSTANT_SPEED
-
-
-def _convex_parts(name: str, outline: ArrayLike) -> ConvexParts:
-    """The convex parts of an outline, concave or not; the largest first, as it may be a chassis."""
-    try:
-        return (convex_outline(name, outline),)
-    except NotConvexError:
-        from pushplan.world.outline_repair import cut_outlines  # loads Shapely
-
-        pieces = cut_outlines(name, [outline], lambda _: name)[0]
-        return tuple(sorted(pieces, key=signed_area, reverse=True))

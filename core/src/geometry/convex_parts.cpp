@@ -15,6 +15,7 @@ namespace pushplan {
 namespace {
 
 constexpr double kRounding = 1e-12;  // fraction of the area of all pieces that counts as none
+constexpr std::size_t kFew = 8;      // corners up to which a part counts as small
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
@@ -55,6 +56,17 @@ std::vector<Vec2> hull_of(std::vector<Vec2> points, const std::vector<Vec2>& oth
   return hull;
 }
 
+/// Area that the hull of a convex polygon and a point has beyond the polygon [m^2].
+double area_beyond(const std::vector<Vec2>& corners, Vec2 p) {
+  double doubled = 0.0;
+  Vec2 a = corners.back();
+  for (const Vec2 b : corners) {
+    doubled += std::max(0.0, (b.y - a.y) * (p.x - a.x) - (b.x - a.x) * (p.y - a.y));
+    a = b;
+  }
+  return 0.5 * doubled;
+}
+
 /// The pieces, each with the numbers of those that share an edge with it.
 std::vector<Part> with_neighbours(const Polygons& pieces) {
   std::vector<Part> parts;
@@ -83,16 +95,23 @@ std::vector<Part> with_neighbours(const Polygons& pieces) {
 
 std::vector<Index> merge_pieces(const Polygons& pieces, double budget) {
   std::vector<Part> parts = with_neighbours(pieces);
-  std::vector<Index> owners(parts.size());
+  std::vector<Index> merged_into(parts.size(), -1);
   double total = 0.0;
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    owners[i] = static_cast<Index>(i);
-    total += parts[i].area;
-  }
+  for (const Part& part : parts) total += part.area;
   std::set<Merger> mergers;
   const auto offer = [&](Index i, Index j) {
     const Part& a = parts[at(i)];
     const Part& b = parts[at(j)];
+    const auto& [small, large] = std::minmax(a, b, [](const Part& one, const Part& other) {
+      return one.corners.size() < other.corners.size();
+    });
+    // a large part may have many small neighbours, and few of them can be merged with it
+    if (small.corners.size() <= kFew && large.corners.size() > kFew) {
+      const double most = small.area + budget + kRounding * total;
+      for (const Vec2 p : small.corners) {
+        if (area_beyond(large.corners, p) > most) return;
+      }
+    }
     const double gain = polygon_area(hull_of(a.corners, b.corners)) - a.area - b.area;
     mergers.insert({gain < kRounding * total ? 0.0 : gain, i, j});
   };
@@ -103,15 +122,14 @@ std::vector<Index> merge_pieces(const Polygons& pieces, double budget) {
   }
   while (!mergers.empty() && mergers.begin()->gain <= budget) {
     const auto [gain, first, second] = *mergers.begin();
+    mergers.erase(mergers.begin());
+    if (merged_into[at(first)] >= 0 || merged_into[at(second)] >= 0) continue;
     budget -= gain;
-    std::erase_if(mergers, [first, second](const Merger& each) {
-      return each.first == first || each.first == second || each.second == first ||
-             each.second == second;
-    });
     const auto merged = static_cast<Index>(parts.size());
     Part part{hull_of(parts[at(first)].corners, parts[at(second)].corners), 0.0, {}};
     part.area = parts[at(first)].area + parts[at(second)].area + gain;
     for (const Index i : {first, second}) {
+      merged_into[at(i)] = merged;
       for (const Index k : parts[at(i)].neighbours) {
         parts[at(k)].neighbours.erase(i);
         if (k == first || k == second) continue;
@@ -120,12 +138,17 @@ std::vector<Index> merge_pieces(const Polygons& pieces, double budget) {
       }
     }
     parts.push_back(std::move(part));
+    merged_into.push_back(-1);
     for (const Index k : parts.back().neighbours) offer(k, merged);
-    std::ranges::replace(owners, first, merged);
-    std::ranges::replace(owners, second, merged);
   }
-  const std::set<Index> left(owners.begin(), owners.end());
-  for (Index& owner : owners) owner = std::distance(left.begin(), left.find(owner));
+  // a part is merged into one with a greater number, so the last ones are known first
+  std::vector<Index> owners(parts.size());
+  Index left = 0;
+  for (const Index into : merged_into) left += into < 0 ? 1 : 0;
+  for (std::size_t i = parts.size(); i-- > 0;) {
+    owners[i] = merged_into[i] < 0 ? --left : owners[at(merged_into[i])];
+  }
+  owners.resize(at(pieces.count()));
   return owners;
 }
 

@@ -36,6 +36,7 @@ from pushplan.world.robot import RobotModel
 from pushplan.world.scene import World
 from pushplan.world.static_map import StaticMap
 from pushplan.world.stored.nav2_map import load_nav2_map
+from pushplan.world.units import check_units
 
 SCHEMA = "pushplan-world/1"
 """Name and version of the file format; files of another version are refused."""
@@ -184,19 +185,29 @@ def world_from_dict(data: object, folder: str | Path = ".") -> World:
     )
 
 
-def load_world(path: str | Path) -> World:
+def load_world(path: str | Path, *, strict: bool = False) -> World:
     """Read a world from a ``.json``, ``.yaml`` or ``.yml`` file.
+
+    Values that look like other units, such as walls outside the bounds or a heading of more than
+    two turns, are reported by a `pushplan.world.units.UnitsWarning`.
+
+    Args:
+        path: the file.
+        strict: raise that warning as an error.
 
     Raises:
         SchemaError: if the file is missing, over a limit of `safe_files`, not readable as JSON or
             YAML, or off the schema.
+        InvalidInputError: if the types of `pushplan.world` refuse a value, or ``strict`` does.
     """
     data = read_data(path, "world file")
     path = Path(path)
     try:
-        return world_from_dict(data, path.parent)
+        world = world_from_dict(data, path.parent)
     except InvalidInputError as error:
         raise type(error)(f"{path}: {error}") from error
+    check_units(world, str(path), cropped="map" in data.get("static", {}), strict=strict)
+    return world
 
 
 def save_world(world: World, path: str | Path) -> None:
