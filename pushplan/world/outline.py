@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
@@ -15,6 +16,9 @@ from pushplan.world.checks import BoolArray, FloatArray, IntArray, array, frozen
 ConvexParts = tuple[FloatArray, ...]
 """Convex outlines, counter-clockwise, each (N, 2) [m]; the shape is their union."""
 
+MOST_CORNERS = 1000
+"""Corners of an outline that planners work with at most."""
+_ALIKE = 4.0  # heights of edges over their median that are left out in one round
 LARGEST_M = 1e70
 """Greatest coordinate [m]: its fourth power is finite still."""
 
@@ -183,6 +187,43 @@ def grown_outlines(
     keep = np.column_stack([np.ones(len(corners), dtype=np.bool_), sharp & (margin[:, 0] > 0.0)])
     grown_offsets: IntArray = np.concatenate([[0], np.cumsum(keep.sum(axis=1))])[offsets]
     return np.stack([first, second], axis=1)[keep], grown_offsets
+
+
+def enclosing_outline(corners: FloatArray) -> FloatArray:
+    """A convex outline around another one (N, 2) [m], with at most `MOST_CORNERS` corners.
+
+    It is the outline itself if that has no more; the radius of a circle becomes a hundred
+    thousandth greater. Edges are left out whose neighbours meet nearest to them, in rounds of at
+    most every other one.
+    """
+    while len(corners) > MOST_CORNERS:
+        edges = np.roll(corners, -1, axis=0) - corners
+        lengths = np.hypot(edges[:, 0], edges[:, 1])
+        along = edges / lengths[:, None]
+        last = np.roll(along, 1, axis=0)
+        following = np.roll(along, -1, axis=0)
+        before = _sines(last, along)
+        after = _sines(along, following)
+        both = _sines(last, following)
+        fit = (before >= 0.0) & (after >= 0.0) & ((last * following).sum(axis=1) > 0.0)
+        # how far from its beginning the neighbours of an edge meet: at its end if it is straight
+        reach = lengths * np.divide(after, both, out=np.ones(len(edges)), where=both > 0.0)
+        heights = np.where(fit, reach * before, np.inf)
+        limit = _ALIKE * float(np.median(heights))
+        if not math.isfinite(limit):
+            break
+        halves = [np.arange(first, len(edges) - 1, 2) for first in (0, 1)]
+        low = max((half[heights[half] <= limit] for half in halves), key=len)
+        low = low[np.argsort(heights[low], kind="stable")[: len(edges) - MOST_CORNERS]]
+        moved = corners.copy()
+        moved[low] += reach[low, None] * last[low]
+        corners = np.delete(moved, low + 1, axis=0)
+    return corners
+
+
+def _sines(headings: FloatArray, others: FloatArray) -> FloatArray:
+    sines: FloatArray = headings[:, 0] * others[:, 1] - headings[:, 1] * others[:, 0]
+    return sines
 
 
 def listed(name: str, outlines: Sequence[Any]) -> Sequence[Any]:

@@ -188,6 +188,18 @@ class World(ArrayRecord, CheckedFields):
         solid = _with_objects(self.static, self.movables.select(fixed))
         return replace(self, static=solid, movables=self.movables.select(~fixed))
 
+    def for_planning(self) -> World:
+        """The same scene as planners take it: what is fixed is static, outlines have few corners.
+
+        See `pushplan.world.outline.enclosing_outline`.
+        """
+        world = self.with_fixed_as_static()
+        static = world.static.with_few_corners()
+        movables = world.movables.with_few_corners()
+        if static is world.static and movables is world.movables:
+            return world
+        return replace(world, static=static, movables=movables)
+
     @property
     def goal_reached(self) -> bool:
         """True if the robot, or every object, is where the goal wants it.
