@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from pushplan.core import gtsp as core
-from pushplan.gtsp.problem import Problem, tour_cost
-from pushplan.gtsp.walks import CHUNK_ARCS, StopFired, Walks
+from pushplan.gtsp.problem import Problem, StopFired, tour_cost
+from pushplan.gtsp.walks import CHUNK_ARCS, Walks
 from pushplan.world.checks import FloatArray, IntArray
 
 MOST_CLUSTERS = 62

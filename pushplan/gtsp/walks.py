@@ -13,17 +13,13 @@ from collections.abc import Callable
 import numpy as np
 
 from pushplan.core import gtsp as core
-from pushplan.gtsp.problem import Padded
+from pushplan.gtsp.problem import Padded, StopFired
 from pushplan.world.checks import FloatArray, IntArray
 
 MARGIN = 1e-10
 """Fraction of the largest cost by which sums of floats may be off."""
 CHUNK_ARCS = 2_000_000
 """Arcs that are looked at between two looks at the stop rule."""
-
-
-class StopFired(Exception):
-    """The stop rule has fired."""
 
 
 class Walks:
