@@ -99,7 +99,6 @@ class Problem:
             some[self.cluster_of[rows, None] == self.cluster_of] = np.inf
             yield rows, some
 
-    @cached_property
     def outer(self) -> FloatArray:
         """(N, N) costs, infinite inside of clusters."""
         result = np.empty_like(self.costs)

@@ -182,8 +182,8 @@ class _SolverCall:
         """Choose a method and run it."""
         try:
             return self._solve()
-        except StopFired:
-            return self._failed()
+        except StopFired:  # before there was an order: any is a tour where no arc is forbidden
+            return self._tour(np.array([nodes[0] for nodes in self.members]))
 
     def _solve(self) -> Tour:
         config = self.config
@@ -270,7 +270,10 @@ class _SolverCall:
         if not prove_it or late or budget.check(0, cost):
             return self._tour(chosen, bound)
         budget.note(cost)
-        proof = prove(problem, cost, lambda: budget.check(0, budget.cost), _PROOF_STATES)
+        try:
+            proof = prove(problem, cost, self._late, _PROOF_STATES)
+        except StopFired:
+            return self._tour(chosen, bound)
         self.detail["paths"] = float(proof.paths)
         if proof.nodes is not None:
             chosen = problem.names[proof.nodes]

@@ -52,8 +52,10 @@ class Walks:
 
     def _gather(self, members: list[IntArray]) -> None:
         """Costs between these nodes."""
+        self.look()
         self.nodes = Padded.gather(self._all, members)
         self.width = self.nodes.names.shape[1]
+        self.look()
         self.blocks = np.ascontiguousarray(self.nodes.costs.transpose(2, 3, 0, 1))  # to, from
         self.first = self.nodes.pick(self._all[self.node])
         self.last = self.nodes.pick(self._all[:, self.node])
