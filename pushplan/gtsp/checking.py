@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pushplan.errors import InvalidInputError, short
+from pushplan.gtsp.distances import Distances
 from pushplan.world.checks import FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -196,7 +197,7 @@ def checked_nodes(label: str, nodes: object, names: Sequence[Any], size: int) ->
 def check_tour(
     label: str,
     nodes: IntArray,
-    costs: NDArray[np.number],
+    costs: NDArray[np.number] | Distances,
     clusters: Sequence[IntArray],
     *,
     closed: bool = False,

@@ -25,7 +25,6 @@ from pushplan.world.checks import (
 from pushplan.world.convex_shapes import areas_and_centres, disjoint, hull_of, rings_of, shapes_of
 from pushplan.world.outline import (
     LARGEST_M,
-    MOST_CORNERS,
     ConvexParts,
     areas_and_centroids,
     convex_outline,
@@ -390,13 +389,12 @@ class Movables(ArrayRecord, CheckedFields):
 
     @cached_property
     def _few_corners(self) -> tuple[FloatArray, IntArray]:
-        parts = unflatten(self.drawn_vertices, self.drawn_offsets)
-        return flatten([enclosing_outline(part) for part in parts])
+        return flatten(
+            [*map(enclosing_outline, unflatten(self.drawn_vertices, self.drawn_offsets))]
+        )
 
     def with_few_corners(self) -> Movables:
         """The objects with each part as `pushplan.world.outline.enclosing_outline` makes it."""
-        if np.diff(self.drawn_offsets).max(initial=0) <= MOST_CORNERS:
-            return self
         values = {one.name: getattr(self, one.name) for one in fields(self)}
         values["drawn_vertices"], values["drawn_offsets"] = map(frozen, self._few_corners)
         return self._unchecked(values)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
@@ -197,33 +196,28 @@ def enclosing_outline(corners: FloatArray) -> FloatArray:
     most every other one.
     """
     while len(corners) > MOST_CORNERS:
-        edges = np.roll(corners, -1, axis=0) - corners
-        lengths = np.hypot(edges[:, 0], edges[:, 1])
-        along = edges / lengths[:, None]
-        last = np.roll(along, 1, axis=0)
-        following = np.roll(along, -1, axis=0)
-        before = _sines(last, along)
-        after = _sines(along, following)
-        both = _sines(last, following)
-        fit = (before >= 0.0) & (after >= 0.0) & ((last * following).sum(axis=1) > 0.0)
+        points = corners[:, 0] + 1j * corners[:, 1]
+        edges = np.roll(points, -1) - points
+        along = edges / np.abs(edges)
+        last = np.roll(along, 1)
+        following = np.roll(along, -1)
+        # their imaginary parts are the sines of the turns
+        before, after, both = last.conj() * along, along.conj() * following, last.conj() * following
+        fit = (before.imag >= 0.0) & (after.imag >= 0.0) & (both.real > 0.0)
         # how far from its beginning the neighbours of an edge meet: at its end if it is straight
-        reach = lengths * np.divide(after, both, out=np.ones(len(edges)), where=both > 0.0)
-        heights = np.where(fit, reach * before, np.inf)
+        share = np.divide(after.imag, both.imag, out=np.ones(len(edges)), where=both.imag > 0.0)
+        reach = np.abs(edges) * share
+        heights = np.where(fit, reach * before.imag, np.inf)
         limit = _ALIKE * float(np.median(heights))
-        if not math.isfinite(limit):
+        if limit == np.inf:
             break
         halves = [np.arange(first, len(edges) - 1, 2) for first in (0, 1)]
         low = max((half[heights[half] <= limit] for half in halves), key=len)
         low = low[np.argsort(heights[low], kind="stable")[: len(edges) - MOST_CORNERS]]
-        moved = corners.copy()
-        moved[low] += reach[low, None] * last[low]
-        corners = np.delete(moved, low + 1, axis=0)
+        points[low] += reach[low] * last[low]
+        points = np.delete(points, low + 1)
+        corners = np.column_stack([points.real, points.imag])
     return corners
-
-
-def _sines(headings: FloatArray, others: FloatArray) -> FloatArray:
-    sines: FloatArray = headings[:, 0] * others[:, 1] - headings[:, 1] * others[:, 0]
-    return sines
 
 
 def listed(name: str, outlines: Sequence[Any]) -> Sequence[Any]:

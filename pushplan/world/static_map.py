@@ -15,13 +15,7 @@ from pushplan.world.checked_fields import CheckedFields, Shape
 from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, array, checked_bounds, frozen
 from pushplan.world.convex_shapes import shapes_of
 from pushplan.world.occupancy_grid import occupancy_polygons, occupied_cells
-from pushplan.world.outline import (
-    MOST_CORNERS,
-    enclosing_outline,
-    flatten,
-    listed,
-    outline_boxes,
-)
+from pushplan.world.outline import flatten, listed, outline_boxes
 
 CAP_CORNERS = 9
 """Corners of each half circle where a thick segment is turned into a polygon."""
@@ -147,16 +141,6 @@ class StaticMap(ArrayRecord, CheckedFields):
             for line, radius in zip(self.segments, self.radii, strict=True)
         ]
         return (*self.polygons, *ends)
-
-    @cached_property
-    def _few_corners(self) -> StaticMap:
-        few = tuple(map(enclosing_outline, self.polygons))
-        return StaticMap(few, self.segments, self.radii, self.bounds)
-
-    def with_few_corners(self) -> StaticMap:
-        """The map with each polygon as `pushplan.world.outline.enclosing_outline` makes it."""
-        few = max(map(len, self.polygons), default=0) <= MOST_CORNERS
-        return self if few else self._few_corners
 
     @cached_property
     def packed(self) -> tuple[FloatArray, IntArray]:

@@ -173,18 +173,15 @@ class ShipIceTask(Task):
             low = np.array([-water[3], water[0]])
             turn = _UP
         ice = self.ice_bounds
-        if width > ice[2]:
-            wide = [name for name, preset in PRESETS.items() if preset.channel[0] >= width]
-            remedy = f"presets with such a channel: {', '.join(wide) or 'none'}"
-        elif ice[1] + length > ice[3]:
-            longest = self.static.bounds[3] - ice[3] + ice[1] + length
-            remedy = f"channel_length must be at least {longest:g} m"
-        else:
-            to = (0.5 * (ice[2] - width), ice[1])
-            return np.array([*(to - low), turn])
+        most = ice[2:] - ice[:2]
+        if width <= most[0] and length <= most[1]:
+            return np.array([*((0.5 * (most[0] - width), ice[1]) - low), turn])
+        wide = [name for name, preset in PRESETS.items() if preset.channel[0] >= width]
+        longest = self.static.bounds[3] - most[1] + max(length, most[1])
         raise InvalidInputError(
-            f"its water of {width:g} x {length:g} m does not fit in the ice field of {ice[2]:g} x "
-            f"{ice[3] - ice[1]:g} m: {remedy}"
+            f"its water of {width:g} x {length:g} m does not fit in the ice field of {most[0]:g} x "
+            f"{most[1]:g} m; presets that are wide enough: {', '.join(wide) or 'none'}; "
+            f"channel_length of this one for the length: {longest:g} m"
         )
 
     def start(self, rng: np.random.Generator) -> World:
