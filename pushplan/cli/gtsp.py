@@ -16,18 +16,16 @@ def run(options: argparse.Namespace) -> int:
 
     check_file(options.out)
     instance = read_gtsp(options.file)
+    count = len(instance.table)
     for node in options.fixed_start:
-        if node > len(instance.costs):
-            raise InvalidInputError(
-                f"--fixed-start has node {node}, but nodes are 1 to {len(instance.costs)}"
-            )
+        if node > count:
+            raise InvalidInputError(f"--fixed-start has node {node}, but nodes are 1 to {count}")
     if options.iterations:
         stop: Stop = MaxIterations(options.iterations)
     else:
         stop = Deadline(options.seconds)
     tour = solve_gtsp(
-        instance.costs,
-        instance.clusters,
+        instance,
         stop=stop,
         rng=stream(options.seed, "gtsp"),
         config=GtspConfig(method=options.method, lower_bound=options.bound),
@@ -38,7 +36,7 @@ def run(options: argparse.Namespace) -> int:
     nodes = [int(node) + 1 for node in tour.nodes]
     about = {"name": instance.name, "status": tour.status.label, "cost": tour.cost}
     about |= {"lower_bound": tour.lower_bound, "nodes": nodes, "stats": stats}
-    lines = [f"{instance.name}: {len(instance.costs)} nodes in {len(instance.clusters)} clusters"]
+    lines = [f"{instance.name}: {count} nodes in {len(instance.clusters)} clusters"]
     if not tour.status.has_tour:
         tell(options, about, *lines, f"  {tour.status.label}: {tour.status.remedy}")
         return 1

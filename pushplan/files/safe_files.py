@@ -13,9 +13,10 @@ import os
 import re
 import stat
 import sys
+import warnings
 import zipfile
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any
 
@@ -42,6 +43,10 @@ _STEPS[[ord("["), ord("{")]] = 1
 _STEPS[[ord("]"), ord("}")]] = -1
 _NO_DIGITS = np.ones(256, dtype=np.bool_)
 _NO_DIGITS[ord("0") : ord("9") + 1] = False
+
+
+class UnusedInputWarning(UserWarning):
+    """A file holds something that its reader does not use."""
 
 
 def read_bytes(path: str | Path, what: str = "file", limit: int = MAX_BYTES) -> bytes:
@@ -187,7 +192,7 @@ def known_keys(
 ) -> Mapping[str, Any]:
     """Check the keys of a mapping from a file, of which ``valid`` may be there, and return it.
 
-    Any key may be there if ``valid`` is None.
+    Any key may be there if ``valid`` is None: the caller passes on to `name_unused` what it leaves.
 
     Raises:
         SchemaError: if it is no mapping, a required key is missing, or a key is unknown.
@@ -201,6 +206,19 @@ def known_keys(
         if key not in data:
             raise SchemaError(f"{kind} lacks the required key {key!r}")
     return data
+
+
+def name_unused(kind: str, names: Iterable[str]) -> None:
+    """Warn once, by an `UnusedInputWarning`, of all that a file holds and its reader does not use.
+
+    Args:
+        kind: the file, or the part of it.
+        names: what is not used, such as keys; nothing is said if there are none.
+    """
+    unused = sorted({short(name).strip("'") for name in names})
+    if unused:
+        text = f"{kind}: not used: {', '.join(unused)}"
+        warnings.warn(text, UnusedInputWarning, stacklevel=4)
 
 
 def _array(file: IO[bytes], limit: int) -> NDArray[Any]:

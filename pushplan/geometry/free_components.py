@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,11 +51,16 @@ class FreeComponents(ArrayRecord):
 
 
 def object_clearance(
-    movables: Movables, k: int, pose: FloatArray, grid: Grid, reach: float
+    movables: Movables,
+    k: int,
+    pose: FloatArray,
+    grid: Grid,
+    reach: float,
+    stopped: Callable[[], bool] = lambda: False,
 ) -> FloatArray:
     """(rows, columns) distance [m] of each cell centre to object ``k`` at a pose (3,).
 
-    Beyond ``reach`` [m] it may be infinite.
+    Beyond ``reach`` [m] it may be infinite. It is left undone as `clearance_field` is.
     """
     outline = movables.moved_to(
         np.concatenate([movables.poses[:k], pose[None], movables.poses[k + 1 :]])
@@ -70,5 +76,5 @@ def object_clearance(
         corners = grid.origin + step * np.array([[left, bottom], [right, top]])
         near = Grid(corners[0], step, (top - bottom, right - left))
         shape = StaticMap.build([outline], bounds=corners.ravel())
-        found[bottom:top, left:right] = clearance_field(shape, near)
+        found[bottom:top, left:right] = clearance_field(shape, near, stopped)
     return frozen(found)

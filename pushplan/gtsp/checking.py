@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pushplan.errors import InvalidInputError, short
+from pushplan.gtsp.distances import Distances
 from pushplan.world.checks import FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -16,12 +17,25 @@ if TYPE_CHECKING:
 
 LARGEST = 1e290
 """Finite costs stay below this, so that no sum of them overflows."""
+_PIECE = 1_000_000  # costs between two looks at a stop rule
 LARGEST_WHOLE = 2**53
 """Whole numbers stay below this as a sum, so that float64 holds them exactly."""
 
 
-def checked_costs(costs: ArrayLike) -> NDArray[np.number]:
+def row_pieces(costs: NDArray[np.number]) -> list[slice]:
+    """Rows of (N, N) costs that take a few milliseconds at a time."""
+    step = max(1, _PIECE // max(costs.shape[1], 1))
+    return [slice(low, min(low + step, len(costs))) for low in range(0, len(costs), step)]
+
+
+def checked_costs(
+    costs: ArrayLike, stopped: Callable[[], bool] = lambda: False
+) -> NDArray[np.number]:
     """The cost matrix, not copied if it is an array already.
+
+    Args:
+        costs: the matrix.
+        stopped: asked every few milliseconds; where it says so, the other rows are not looked at.
 
     Raises:
         InvalidInputError: if it is not square, not numeric, NaN, minus infinity or too large.
@@ -34,8 +48,17 @@ def checked_costs(costs: ArrayLike) -> NDArray[np.number]:
         raise InvalidInputError(f"costs must be numbers, got an array of {matrix.dtype}")
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.size:
         raise InvalidInputError(f"costs must have shape (N, N) with N >= 1, got {matrix.shape}")
-    low = matrix.min()
-    high = matrix.max()
+    low = np.inf
+    high = -np.inf  # of the finite ones
+    for rows in row_pieces(matrix):
+        if rows.start and stopped():
+            break
+        some = matrix[rows]
+        low = np.minimum(low, some.min())
+        top = some.max()
+        if top == np.inf:
+            top = some.max(where=some < np.inf, initial=-np.inf)
+        high = np.maximum(high, top)
     if np.isnan(low):
         u, v = np.argwhere(np.isnan(matrix))[0]
         raise InvalidInputError(f"costs must not be NaN, got NaN from node {u} to node {v}")
@@ -44,8 +67,6 @@ def checked_costs(costs: ArrayLike) -> NDArray[np.number]:
         raise InvalidInputError(
             f"costs must be above -inf, got -inf from node {u} to node {v}; +inf forbids an arc"
         )
-    if high == np.inf:
-        high = matrix.max(where=matrix < np.inf, initial=low)
     largest = 0.0
     if low < np.inf:
         largest = max(abs(float(low)), abs(float(high)))
@@ -176,7 +197,7 @@ def checked_nodes(label: str, nodes: object, names: Sequence[Any], size: int) ->
 def check_tour(
     label: str,
     nodes: IntArray,
-    costs: NDArray[np.number],
+    costs: NDArray[np.number] | Distances,
     clusters: Sequence[IntArray],
     *,
     closed: bool = False,

@@ -1,9 +1,9 @@
 """Reading GTSPLIB files: TSPLIB 95 (Reinelt 1995) with a section for the clusters.
 
-Keywords stand before the data; a colon after them is optional. Lines that begin with ``#`` and
-keywords that say nothing about the problem are left out, and so is the author after a type. The
-short form of the solver GLNS is read too. Every complaint names the file, the line and the rule
-that it breaks.
+Keywords stand before the data; a colon after them is optional. Lines that begin with ``#`` are left
+out, and so is the author after a type. An `UnusedInputWarning` names keywords and sections that are
+not used. The short form of the solver GLNS is read too. Every complaint names the file, the line
+and the rule that it breaks.
 """
 
 from __future__ import annotations
@@ -72,6 +72,8 @@ class TsplibText:
     keywords: dict[str, tuple[str, int]] = field(default_factory=dict)
     # the line number of its heading and what is below it
     sections: dict[str, tuple[int, Rows]] = field(default_factory=dict)
+    # keywords and sections that nobody has asked for
+    unread: set[str] = field(default_factory=set)
 
     def wrong(self, line: int, rule: str) -> SchemaError:
         """An error at a line."""
@@ -81,6 +83,7 @@ class TsplibText:
         """The value of a keyword, and its line."""
         if key not in self.keywords:
             raise SchemaError(f"{self.path}: the keyword {key} is missing")
+        self.unread.discard(key)
         return self.keywords[key]
 
     def choice(self, key: str, valid: tuple[str, ...]) -> str:
@@ -103,6 +106,7 @@ class TsplibText:
         """Return the line at which a section begins, and its lines as words."""
         if name not in self.sections:
             raise SchemaError(f"{self.path}: the section {name} is missing")
+        self.unread.discard(name)
         return self.sections[name]
 
     def whole_numbers(self, name: str) -> Iterator[tuple[int, int]]:
@@ -110,6 +114,10 @@ class TsplibText:
         for line, words in self.section(name)[1]:
             for word in words:
                 yield line, self.whole(line, word)
+
+    def name_unused(self) -> None:
+        """Name what nobody has asked for, but for texts that only people read."""
+        safe_files.name_unused(str(self.path), self.unread - {"NAME", "COMMENT"})
 
     def number(self, line: int, word: str) -> float:
         """A word as a number; NaN is none."""
@@ -151,16 +159,19 @@ def read_text(path: str | Path) -> TsplibText:
         if head in _SECTIONS:
             rows = []
             text.sections[head] = (number, rows)
+            text.unread.add(head)
         elif head in _KEYWORDS:
             rest = line.strip()[len(head) :].strip()
             text.keywords[head] = (rest.removeprefix(":").strip(), number)
+            text.unread.add(head)
             rows = None
         elif head[0].isalpha() and head not in ("INF", "INFINITY", "NAN"):
             meant = difflib.get_close_matches(head[:80], _KEYWORDS + _SECTIONS, n=1, cutoff=0.8)
             if meant or ":" not in line:
                 rule = unknown_name_message("keyword", head, _KEYWORDS + _SECTIONS)
                 raise text.wrong(number, rule)
-            rows = None  # it says nothing about the problem
+            text.unread.add(head)
+            rows = None
         elif rows is not None:
             rows.append((number, words))
         elif {"N", "M"} <= text.keywords.keys():
@@ -208,10 +219,12 @@ def read_gtsp(path: str | Path) -> GtspInstance:
     clusters = _clusters(text, size)
     name, _ = text.keywords.get("NAME", (text.path.stem, 0))
     comment, _ = text.keywords.get("COMMENT", ("", 0))
+    given = _matrix(text, size) if kind == "EXPLICIT" else _points(text, size)
+    text.name_unused()
     try:
         if kind == "EXPLICIT":
-            return GtspInstance(name, _matrix(text, size), clusters, comment=comment)
-        return GtspInstance.from_coordinates(name, _points(text, size), clusters, kind, comment)
+            return GtspInstance(name, given, clusters, comment=comment)
+        return GtspInstance.from_coordinates(name, given, clusters, kind, comment)
     except SchemaError:
         raise
     except InvalidInputError as error:

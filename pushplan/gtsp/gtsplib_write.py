@@ -108,6 +108,7 @@ def read_tour(path: str | Path) -> tuple[int, ...]:
         count = text.count("DIMENSION", LARGEST_DIMENSION)
         if count != len(nodes):
             raise text.wrong(begin, f"expected {count} nodes, as DIMENSION says, got {len(nodes)}")
+    text.name_unused()
     return tuple(nodes)
 
 

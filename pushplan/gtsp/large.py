@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from pushplan.gtsp.distances import Distances
 from pushplan.world.checks import IntArray
 
 NEAREST = 5
@@ -14,7 +15,7 @@ NEAREST = 5
 
 
 def promising(
-    costs: NDArray[np.number],  # (N, N)
+    costs: NDArray[np.number] | Distances,  # (N, N)
     members: Sequence[IntArray],  # nodes of each cluster
     most: int,  # nodes in all, but at least one of each cluster
     # asked between clusters; what is not yet looked at keeps its order
@@ -44,19 +45,22 @@ def promising(
 
 
 def best_choice(
-    costs: NDArray[np.number],  # (N, N)
+    costs: NDArray[np.number] | Distances,  # (N, N)
     layers: Sequence[IntArray],  # nodes of each cluster in visiting order, at least 2 clusters
-) -> IntArray:
+    stopped: Callable[[], bool],  # asked between clusters
+) -> IntArray | None:
     """The cheapest nodes for a closed order of clusters, on costs that are not gathered.
 
     Returns:
-        A node of each.
+        A node of each; None if it was stopped.
     """
     values = np.where(np.eye(len(layers[0])) > 0.0, 0.0, np.inf)  # (root, node)
     picks: list[IntArray] = []
     for here, there in zip(layers, [*layers[1:], layers[0]], strict=True):
+        if stopped():
+            return None
         arcs = costs[np.ix_(here, there)]
-        pick = np.array([(row[:, None] + arcs).argmin(axis=0) for row in values])  # (root, there)
+        pick = (values[:, :, None] + arcs).argmin(axis=1)  # (root, there)
         values = np.take_along_axis(values, pick, 1) + arcs[pick, np.arange(len(there))]
         picks.append(pick)
     at = root = int(np.diag(values).argmin())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -12,7 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pushplan.core import gtsp as core
+from pushplan.gtsp.checking import row_pieces
+from pushplan.gtsp.distances import Distances
 from pushplan.world.checks import FloatArray, IntArray
+
+
+class StopFired(Exception):
+    """The stop rule has fired."""
 
 
 @dataclass(frozen=True)
@@ -23,21 +29,33 @@ class Problem:
     offsets: IntArray  # (m + 1,) cluster c has the nodes ``offsets[c]`` to ``offsets[c + 1] - 1``
     names: IntArray  # (N,) what the caller calls each node
     forbidden: float | None = None  # `penalty` if it is that of a problem with more nodes
+    # asked every few milliseconds; `StopFired` is raised where it says so
+    stopped: Callable[[], bool] = lambda: False
 
     @staticmethod
-    def build(costs: NDArray[np.number], members: Sequence[IntArray]) -> Problem:
+    def build(
+        costs: NDArray[np.number] | Distances,
+        members: Sequence[IntArray],
+        stopped: Callable[[], bool],
+    ) -> Problem:
         """Gather the members of each cluster; what is in order is not copied."""
         names = np.concatenate(members)
         offsets = np.concatenate(([0], np.cumsum([len(nodes) for nodes in members])))
-        if len(names) == len(costs) and (names == np.arange(len(names))).all():
-            gathered = np.ascontiguousarray(costs, dtype=np.float64)
+        whole = len(names) == len(costs) and bool((names == np.arange(len(names))).all())
+        if whole and isinstance(costs, np.ndarray) and costs.dtype == np.float64:
+            gathered = np.ascontiguousarray(costs)
         else:
-            gathered = costs[np.ix_(names, names)].astype(np.float64)
-        return Problem(gathered, offsets.astype(np.int64), names.astype(np.int64))
+            gathered = np.empty((len(names), len(names)))
+            for rows in asked(gathered, stopped):
+                gathered[rows] = costs[np.ix_(names[rows], names)]
+        places = offsets.astype(np.int64)
+        return Problem(gathered, places, names.astype(np.int64), stopped=stopped)
 
     def reduced(self) -> Problem:
         """The same without nodes that another one of their cluster can always stand for."""
         needed = np.ones(len(self.costs), np.int64)
+        if self.width == 1:
+            return self
         core.mark_needed(self.costs, np.ascontiguousarray(self.costs.T), self.offsets, needed)
         if needed.all():
             return self
@@ -46,7 +64,8 @@ class Problem:
     def only(self, kept: IntArray) -> Problem:
         """The same with some nodes, (k,) ascending, at least one of each cluster."""
         costs = self.costs[np.ix_(kept, kept)]
-        return Problem(costs, np.searchsorted(kept, self.offsets), self.names[kept], self.penalty)
+        offsets = np.searchsorted(kept, self.offsets)
+        return Problem(costs, offsets, self.names[kept], self.penalty, self.stopped)
 
     @property
     def count(self) -> int:
@@ -73,12 +92,18 @@ class Problem:
         """(N,) the cluster of each node."""
         return np.repeat(np.arange(self.count), np.diff(self.offsets))
 
-    @cached_property
+    def _outer_rows(self) -> Iterator[tuple[slice, FloatArray]]:
+        """A few rows at a time of the costs, infinite inside of clusters, and which they are."""
+        for rows in asked(self.costs, self.stopped):
+            some = self.costs[rows].copy()
+            some[self.cluster_of[rows, None] == self.cluster_of] = np.inf
+            yield rows, some
+
     def outer(self) -> FloatArray:
         """(N, N) costs, infinite inside of clusters."""
-        result = self.costs.copy()
-        for low, high in zip(self.offsets[:-1], self.offsets[1:], strict=True):
-            result[low:high, low:high] = np.inf
+        result = np.empty_like(self.costs)
+        for rows, some in self._outer_rows():
+            result[rows] = some
         return result
 
     @cached_property
@@ -86,15 +111,24 @@ class Problem:
         """Cost of a forbidden arc, which no tour over finite arcs reaches."""
         if self.forbidden is not None:
             return self.forbidden
-        inside = self.outer[np.isfinite(self.outer)]
-        low, high = (inside.min(), inside.max()) if inside.size else (0.0, 1.0)
+        low = np.inf
+        high = -np.inf
+        for _, some in self._outer_rows():
+            known = np.isfinite(some)
+            low = min(low, some.min())
+            high = max(high, some.max(where=known, initial=-np.inf))
+        if high == -np.inf:
+            low = 0.0
+            high = 1.0
         return float(high + (self.count + 1) * (high - low) + (abs(high) or 1.0))
 
     @cached_property
     def finite(self) -> FloatArray:
         """(N, N + SPARE) costs; a forbidden arc costs `penalty`."""
         wide = np.full((len(self.costs), len(self.costs) + core.SPARE), self.penalty)
-        wide[:, : -core.SPARE] = np.where(np.isfinite(self.costs), self.costs, self.penalty)
+        for rows in asked(self.costs, self.stopped):
+            some = self.costs[rows]
+            wide[rows, : -core.SPARE] = np.where(np.isfinite(some), some, self.penalty)
         return wide
 
     @cached_property
@@ -103,32 +137,56 @@ class Problem:
         if self.symmetric:
             return self.finite
         wide = np.full_like(self.finite, self.finite[0, -1])
-        wide[:, : -core.SPARE] = self.finite[:, : -core.SPARE].T
+        for rows in asked(self.costs, self.stopped):
+            wide[rows, : -core.SPARE] = self.finite[:, rows].T
         return wide
 
     @cached_property
     def into(self) -> FloatArray:
         """(m, N) cheapest arc from each cluster to each node."""
-        return _cheapest(self.finite, self.offsets)
+        return self._cheapest(self.finite)
 
     @cached_property
     def onto(self) -> FloatArray:
         """(m, N) cheapest arc from each node to each cluster."""
         if self.symmetric:
             return self.into
-        return _cheapest(self.reverse, self.offsets)
+        return self._cheapest(self.reverse)
+
+    def _cheapest(self, wide: FloatArray) -> FloatArray:
+        least = np.full((self.count, len(self.costs)), np.inf)
+        for rows in asked(self.costs, self.stopped):
+            self._lower(least, rows, wide[rows, : -core.SPARE])
+        return least
+
+    def _lower(self, least: FloatArray, rows: slice, some: FloatArray) -> None:
+        """Note what some rows say of the least value in each cluster of rows."""
+        clusters = slice(self.cluster_of[rows.start], self.cluster_of[rows.stop - 1] + 1)
+        starts = np.maximum(self.offsets[:-1][clusters], rows.start) - rows.start
+        found = np.minimum.reduceat(some, starts, axis=0)
+        np.minimum(least[clusters], found, out=least[clusters])
 
     @cached_property
     def symmetric(self) -> bool:
         """True if every arc costs the same in both directions."""
-        return bool(np.array_equal(self.costs, self.costs.T))
+        costs = self.costs
+        pieces = asked(costs, self.stopped)
+        return all(np.array_equal(costs[rows], costs[:, rows].T) for rows in pieces)
+
+    @cached_property
+    def _least(self) -> tuple[FloatArray, FloatArray]:
+        """(N,) the cheapest arc into each node from another cluster, and out of it to one."""
+        into = np.full(len(self.costs), np.inf)
+        out = np.empty(len(self.costs))
+        for rows, some in self._outer_rows():
+            np.minimum(into, some.min(axis=0), out=into)
+            out[rows] = some.min(axis=1)
+        return into, out
 
     @cached_property
     def floor(self) -> float:
         """No tour is cheaper: into every cluster by its cheapest arc, or out of it."""
-        starts = self.offsets[:-1]
-        into = np.minimum.reduceat(self.outer.min(axis=0), starts)
-        out = np.minimum.reduceat(self.outer.min(axis=1), starts)
+        into, out = (np.minimum.reduceat(arcs, self.offsets[:-1]) for arcs in self._least)
         return max(math.fsum(into), math.fsum(out))  # rounded once, as the cost of a tour is
 
     def nearest(self, most: int) -> tuple[IntArray, FloatArray]:
@@ -137,19 +195,31 @@ class Problem:
         The column minima, then the row minima are taken off, as a cost of its own that every arc
         into a node has says nothing about which cluster is near.
         """
-        reduced = self.outer - _known(self.outer.min(axis=0))
-        reduced -= _known(reduced.min(axis=1))[:, None]
-        starts = self.offsets[:-1]
-        between = np.minimum.reduceat(np.minimum.reduceat(reduced, starts, 0), starts, 1)
+        into = _known(self._least[0])
+        between = np.full((self.count, self.count), np.inf)
+        for rows, some in self._outer_rows():
+            some -= into
+            some -= _known(some.min(axis=1))[:, None]
+            self._lower(between, rows, np.minimum.reduceat(some, self.offsets[:-1], axis=1))
         between = np.minimum(between, between.T)
         np.fill_diagonal(between, np.inf)
-        order = np.argsort(between, axis=1, kind="stable")
-        order = order[order != np.arange(self.count)[:, None]].reshape(self.count, -1)
-        near = np.ascontiguousarray(order[:, :most])
+        near = np.empty((self.count, min(most, self.count - 1)), dtype=np.int64)
+        for rows in asked(between, self.stopped):
+            order = np.argsort(between[rows], axis=1, kind="stable")
+            others = order != np.arange(self.count)[rows, None]
+            near[rows] = order[others].reshape(len(order), -1)[:, :most]
         return near, np.ascontiguousarray(np.take_along_axis(between, near, 1))
 
 
-def tour_cost(costs: NDArray[np.number], nodes: IntArray) -> float:
+def asked(costs: NDArray[np.number], stopped: Callable[[], bool]) -> Iterator[slice]:
+    """Yield `row_pieces`; `StopFired` is raised where the stop rule, asked before each, fires."""
+    for rows in row_pieces(costs):
+        if stopped():
+            raise StopFired
+        yield rows
+
+
+def tour_cost(costs: NDArray[np.number] | Distances, nodes: IntArray) -> float:
     """Cost of a closed tour: the sum of its arcs, rounded once; 0 for a single node."""
     if len(nodes) < 2:
         return 0.0
@@ -159,21 +229,19 @@ def tour_cost(costs: NDArray[np.number], nodes: IntArray) -> float:
     return math.fsum(arcs.tolist())
 
 
-def _cheapest(wide: FloatArray, offsets: IntArray) -> FloatArray:
-    least: FloatArray = np.minimum.reduceat(wide[:, : -core.SPARE], offsets[:-1], axis=0)
-    return np.ascontiguousarray(least)
-
-
 def _known(values: FloatArray) -> FloatArray:
     return np.where(np.isfinite(values), values, 0.0)
 
 
 def usable(
-    costs: NDArray[np.number],  # (N, N)
+    costs: NDArray[np.number] | Distances,  # (N, N)
     members: Sequence[IntArray],  # nodes of each cluster
+    stopped: Callable[[], bool],  # `StopFired` is raised where it says so
 ) -> list[IntArray]:
     """The members of each cluster without nodes that no tour can enter or leave."""
-    if costs.dtype.kind != "f" or not np.isinf(costs.max()):
+    if not isinstance(costs, np.ndarray) or costs.dtype.kind != "f":
+        return list(members)
+    if all(costs[rows].max() < np.inf for rows in asked(costs, stopped)):
         return list(members)
     arcs = np.isfinite(costs)
     for nodes in members:
@@ -181,6 +249,8 @@ def usable(
     active = np.ones(len(costs), dtype=bool)
     while True:
         gone = active & ~(arcs.any(axis=0) & arcs.any(axis=1))
+        if stopped():
+            raise StopFired
         if not gone.any():
             return [nodes[active[nodes]] for nodes in members]
         arcs[gone] = False

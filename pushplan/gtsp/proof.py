@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from pushplan.core import gtsp as core
-from pushplan.gtsp.problem import Problem, tour_cost
-from pushplan.gtsp.walks import CHUNK_ARCS, StopFired, Walks
+from pushplan.gtsp.problem import Problem, StopFired, asked, tour_cost
+from pushplan.gtsp.walks import CHUNK_ARCS, Walks
 from pushplan.world.checks import FloatArray, IntArray
 
 MOST_CLUSTERS = 62
@@ -57,7 +57,10 @@ def prove(
     stopped: Callable[[], bool],  # asked every few milliseconds
     most: int,  # paths of one length at most
 ) -> Proof:
-    """A lower bound, and a proof where the paths are few enough."""
+    """A lower bound, and a proof where the paths are few enough.
+
+    `StopFired` is raised where the stop rule fires before either has begun.
+    """
     result = Proof()
     members = problem.members
     roots = members.pop(problem.root)
@@ -91,11 +94,14 @@ def worth_using(problem: Problem, cost: float) -> FloatArray:
     arc there and what the tour may cost above all cheapest arcs. This keeps a large number that
     stands for a forbidden arc from spoiling the margins of rounding.
     """
-    result = problem.outer
+    result = problem.outer()
     for _ in ("into", "out of"):
         least = np.minimum.reduceat(result.min(axis=0), problem.offsets[:-1])
         spare = cost - math.fsum(least) + 1e-9 * (abs(cost) + math.fsum(np.abs(least)))
-        result = np.where(result - least[problem.cluster_of] > spare, np.inf, result).T
+        for rows in asked(result, problem.stopped):
+            some = result[rows]
+            some[some - least[problem.cluster_of] > spare] = np.inf
+        result = result.T
     return result
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from pushplan.core import gtsp as core
 from pushplan.gtsp.gtsp_config import GtspConfig
-from pushplan.gtsp.problem import Problem, tour_cost
+from pushplan.gtsp.problem import Problem, StopFired, tour_cost
 from pushplan.world.checks import IntArray
 from pushplan.world.stop import MaxIterations, Stop, StopCheck, rules_of
 
@@ -94,27 +94,12 @@ class AnytimeSearch:
         rest = np.delete(np.arange(problem.count), problem.root)
         self.problem = problem
         self.tour = core.RuinRecreate(
-            self._arrays(),
+            _arrays(problem),
             np.concatenate(([problem.root], rest)),
             seed,
             self.max_removed,
             config.blink,
             _SWAP_NEIGHBOURS,
-        )
-
-    def _arrays(self) -> core.Problem:
-        """The problem as the core takes it."""
-        problem = self.problem
-        near, between = problem.nearest(_NEIGHBOURS if problem.symmetric else _NEIGHBOURS * 4 // 3)
-        return core.Problem(
-            problem.finite,
-            problem.reverse,
-            problem.into,
-            problem.onto,
-            problem.offsets,
-            near,
-            between,
-            problem.symmetric,
         )
 
     def run(
@@ -182,8 +167,13 @@ class AnytimeSearch:
                 good[members[worst]] = False
         good[tour.nodes] = good[tour.best_nodes] = True
         kept = np.flatnonzero(good)
-        self.problem = problem.only(kept)
-        tour.narrow(self._arrays(), kept)
+        fewer = problem.only(kept)
+        try:
+            arrays = _arrays(fewer)
+        except StopFired:
+            return
+        self.problem = fewer
+        tour.narrow(arrays, kept)
         self.narrowed = True
 
     def runs_in(self, fraction: float) -> int:
@@ -233,6 +223,21 @@ class AnytimeSearch:
         self._note_best()
 
 
+def _arrays(problem: Problem) -> core.Problem:
+    """The problem as the core takes it."""
+    near, between = problem.nearest(_NEIGHBOURS if problem.symmetric else _NEIGHBOURS * 4 // 3)
+    return core.Problem(
+        problem.finite,
+        problem.reverse,
+        problem.into,
+        problem.onto,
+        problem.offsets,
+        near,
+        between,
+        problem.symmetric,
+    )
+
+
 def search(
     problem: Problem,
     config: GtspConfig,
@@ -240,8 +245,8 @@ def search(
     budget: Budget,
     fraction: float,
     initial: IntArray | None = None,
-) -> IntArray:
-    """The best order of clusters that a fraction of the budget allows.
+) -> tuple[IntArray, IntArray]:
+    """The best order of clusters that a fraction of the budget allows, and a node of each.
 
     Its tour uses a forbidden arc only if no tour without one was found. The first run begins from
     an initial order, at the temperatures of a run from the best tour.
@@ -264,4 +269,4 @@ def search(
         if not again:  # it may have ended early
             whole = whole + budget.gone() - begin
             runs = runs + 1
-    return state.tour.best_order
+    return state.tour.best_order, state.problem.names[state.tour.best_nodes]

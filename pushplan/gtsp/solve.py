@@ -18,10 +18,12 @@ from pushplan.gtsp.checking import (
     checked_nodes,
     graph_instance,
 )
+from pushplan.gtsp.distances import Distances
 from pushplan.gtsp.exact import expected_seconds, solve_exactly, table_mb
 from pushplan.gtsp.gtsp_config import GtspConfig
+from pushplan.gtsp.instance import GtspInstance
 from pushplan.gtsp.large import best_choice, promising
-from pushplan.gtsp.problem import Problem, tour_cost, usable
+from pushplan.gtsp.problem import Problem, StopFired, tour_cost, usable
 from pushplan.gtsp.proof import prove
 from pushplan.gtsp.search import Budget, search
 from pushplan.gtsp.tour import Tour, TourStats, TourStatus
@@ -39,12 +41,14 @@ UNTIMED_S = 5.0
 """Dynamic programming that takes longer is left to the search where time has no limit [s]."""
 PROOF_SETUP_S = 6e-8
 """Time that a proof takes before it looks at the stop rule, for each pair of nodes [s]."""
+CHOICE_S = 3e-5
+"""Time that the choice among all nodes takes after a search, for each cluster [s]."""
 _PROOF_STATES = 2_000_000  # paths that a proof keeps at once at most
 _DEFAULT = GtspConfig()
 
 
 def solve_gtsp(
-    costs: ArrayLike | nx.Graph[Any],
+    costs: ArrayLike | GtspInstance | nx.Graph[Any],
     clusters: Sequence[Sequence[int]] | Sequence[NDArray[np.int64]] | None = None,
     *,
     stop: Stop | None = None,
@@ -59,9 +63,10 @@ def solve_gtsp(
 
     Args:
         costs: (N, N) cost of the arc from each node (row) to each (column), of any sign; inf
-            forbids it. Arcs inside of clusters are not used. Or a NetworkX graph whose nodes have
+            forbids it. Arcs inside of clusters are not used. Or an instance, of whose coordinates
+            only the costs are made that are needed. Or a NetworkX graph whose nodes have
             the attribute ``cluster`` and whose edges have ``weight``; what is missing is forbidden.
-        clusters: the nodes of each cluster: a partition of 0 to N - 1. None for a graph.
+        clusters: the nodes of each cluster: a partition of 0 to N - 1. None for the other two.
         stop: when to return; `MaxIterations` counts rounds of the search, which makes results
             the same on every machine. Without a rule, ``config.iterations`` rounds.
         rng: of the search; the same numbers every time by default.
@@ -83,11 +88,16 @@ def solve_gtsp(
     check_rules(stop, rng)
     budget = Budget.start(stop, config.iterations)
     names: Sequence[Any] = ()
-    if clusters is None:
+    matrix: NDArray[np.number] | Distances
+    if isinstance(costs, GtspInstance):
+        matrix = costs.table
+        clusters = costs.clusters
+    elif clusters is None:
         if not hasattr(costs, "edges"):
             raise InvalidInputError("clusters must be given, or a NetworkX graph in place of costs")
         names, costs, clusters = graph_instance(costs)
-    matrix = checked_costs(costs)
+    if not isinstance(costs, GtspInstance):
+        matrix = checked_costs(costs, budget.stopped)
     members = checked_clusters(clusters, len(matrix))
     if isinstance(fixed_start, int | np.integer):
         fixed_start = [fixed_start]
@@ -129,8 +139,8 @@ def _beginning_in(nodes: IntArray, first: IntArray) -> IntArray:
 
 
 def _contracted(
-    costs: NDArray[np.number], members: tuple[IntArray, ...], start: IntArray
-) -> tuple[NDArray[np.number], tuple[IntArray, ...]]:
+    costs: NDArray[np.number] | Distances, members: tuple[IntArray, ...], start: IntArray
+) -> tuple[NDArray[np.number] | Distances, tuple[IntArray, ...]]:
     """The problem with one node in place of those that every tour begins with.
 
     The node is entered as the first of them and left as the last, at the cost of all arcs between.
@@ -140,7 +150,7 @@ def _contracted(
     others = tuple(nodes for nodes in members if not np.isin(nodes, start).any())
     if len(start) > 1:
         between = costs[start[:-1], start[1:]].sum()
-        costs = costs.copy()
+        costs = costs[np.arange(len(costs))]
         costs[start[0]] = costs[start[-1]] + between
     return costs, (start[:1], *others)
 
@@ -158,7 +168,7 @@ def _given(tour: Tour, nodes: IntArray, cost: float) -> Tour:
 class _SolverCall:
     """One call of the solver."""
 
-    costs: NDArray[np.number]
+    costs: NDArray[np.number] | Distances
     members: tuple[IntArray, ...]
     seed: int
     budget: Budget
@@ -170,13 +180,19 @@ class _SolverCall:
 
     def solve(self) -> Tour:
         """Choose a method and run it."""
+        try:
+            return self._solve()
+        except StopFired:  # before there was an order: any is a tour where no arc is forbidden
+            return self._tour(np.array([nodes[0] for nodes in self.members]))
+
+    def _solve(self) -> Tour:
         config = self.config
         budget = self.budget
         if len(self.members) == 1:
             return self._tour(self.members[0][:1], proven=True)
         if budget.stopped():
             return self._failed()
-        kept = usable(self.costs, self.members)
+        kept = usable(self.costs, self.members, self._late)
         if not all(len(nodes) for nodes in kept):
             return self._failed(infeasible=True)
         limit = config.search_nodes
@@ -187,10 +203,10 @@ class _SolverCall:
             few = promising(
                 self.costs, kept, limit, lambda: budget.gone() > 0.3 or budget.stopped()
             )
-            problem = Problem.build(self.costs, few)
+            problem = Problem.build(self.costs, few, self._late)
             self.detail["nodes"] = float(len(problem.names))
             return self._search(problem, kept)
-        problem = Problem.build(self.costs, kept).reduced()
+        problem = Problem.build(self.costs, kept, self._late).reduced()
         if self._goes_exact(problem):
             alone = config.method == "exact" or problem.count <= 3
             self.method = "exact"
@@ -237,27 +253,37 @@ class _SolverCall:
             for index, cluster in enumerate(self.members):
                 owner[cluster] = index
             begin = owner[self.initial]
-        order = search(
-            problem, config, self.seed, budget, 1.0 - config.proof_fraction if timed else 1.0, begin
-        )
+        choosing = min(CHOICE_S * problem.count / budget.seconds, 0.5)
+        fraction = 1.0 - config.proof_fraction if timed else 1.0 - choosing
+        order, names = search(problem, config, self.seed, budget, fraction, begin)
+        members = [problem.names[nodes] for nodes in problem.members]
         if everything is not None:
-            nodes = best_choice(self.costs, [everything[c] for c in order])
-            return self._tour(nodes)
-        members = problem.members
-        nodes = best_choice(problem.costs, [members[c] for c in order])
-        cost = tour_cost(problem.costs, nodes)
+            members = everything
+        chosen = best_choice(self.costs, [members[c] for c in order], self._late)
+        if chosen is None:
+            chosen = names
+        if everything is not None:
+            return self._tour(chosen)
         bound = problem.floor
+        cost = tour_cost(self.costs, chosen)
         late = budget.elapsed + PROOF_SETUP_S * len(problem.names) ** 2 > budget.seconds
         if not prove_it or late or budget.check(0, cost):
-            return self._tour(problem.names[nodes], bound)
+            return self._tour(chosen, bound)
         budget.note(cost)
-        proof = prove(problem, cost, lambda: budget.check(0, budget.cost), _PROOF_STATES)
+        try:
+            proof = prove(problem, cost, self._late, _PROOF_STATES)
+        except StopFired:
+            return self._tour(chosen, bound)
         self.detail["paths"] = float(proof.paths)
         if proof.nodes is not None:
-            nodes = proof.nodes
+            chosen = problem.names[proof.nodes]
         elif proof.complete and cost == math.inf:
             return self._failed(infeasible=True)
-        return self._tour(problem.names[nodes], max(bound, proof.bound), proven=proof.complete)
+        return self._tour(chosen, max(bound, proof.bound), proven=proof.complete)
+
+    def _late(self) -> bool:
+        """Return True if the stop rule has fired, however many rounds there were."""
+        return self.budget.check(0, self.budget.cost)
 
     def _tour(self, nodes: IntArray, bound: float = -math.inf, *, proven: bool = False) -> Tour:
         cost = tour_cost(self.costs, nodes)

@@ -13,17 +13,13 @@ from collections.abc import Callable
 import numpy as np
 
 from pushplan.core import gtsp as core
-from pushplan.gtsp.problem import Padded
+from pushplan.gtsp.problem import Padded, StopFired
 from pushplan.world.checks import FloatArray, IntArray
 
 MARGIN = 1e-10
 """Fraction of the largest cost by which sums of floats may be off."""
 CHUNK_ARCS = 2_000_000
 """Arcs that are looked at between two looks at the stop rule."""
-
-
-class StopFired(Exception):
-    """The stop rule has fired."""
 
 
 class Walks:
@@ -56,8 +52,10 @@ class Walks:
 
     def _gather(self, members: list[IntArray]) -> None:
         """Costs between these nodes."""
+        self.look()
         self.nodes = Padded.gather(self._all, members)
         self.width = self.nodes.names.shape[1]
+        self.look()
         self.blocks = np.ascontiguousarray(self.nodes.costs.transpose(2, 3, 0, 1))  # to, from
         self.first = self.nodes.pick(self._all[self.node])
         self.last = self.nodes.pick(self._all[:, self.node])

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pushplan.files.safe_files import name_unused
 from pushplan.learned.network_policy import NetworkPolicy
 from pushplan.learned.onnx_guard import GREATEST_FILE, NotOnnxError, inspect
 from pushplan.learned.onnx_session import Door, Network
@@ -101,6 +102,7 @@ def _read(path: Path) -> tuple[bytes, Specification]:
             f"it has no specification (metadata {METADATA_KEY!r}): see "
             "pushplan.training.policies.export, or docs/learned.md"
         )
+    name_unused(f"metadata of {path}", metadata.keys() - {METADATA_KEY})
     return data, Specification.from_json(metadata[METADATA_KEY])
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -20,7 +21,7 @@ from pushplan.world.outline import flatten, outline_boxes
 _SIDE = 96  # cells along the longer side of the workspace, if that resolves the robot's own width
 _MOST = 400  # cells along the longer side at most
 _PIECE = 300  # walls between two looks at a stop rule
-_PIECE_CELLS = 50_000  # the same of the cells that they cover
+_PIECE_CELLS = 50_000  # the same of the cells that they cover, of walls with up to eight corners
 
 
 def _cell(world: World) -> float:
@@ -97,11 +98,13 @@ class _WallWeights:
         self._terms = terms
         self._made = [_no_weights(static.bounds, cell) for _ in terms]
         self._done = 0
+        self._row = 0  # of the next wall, if that takes several pieces
         self._lock = threading.Lock()
         reach = max(away for away, _ in terms)
         low = np.maximum(static.boxes[:, :2] - reach, static.bounds[:2])
         high = np.minimum(static.boxes[:, 2:] + reach, static.bounds[2:])
         cells = (np.maximum(high - low, 0.0) / cell).prod(axis=1)
+        cells *= np.maximum(np.diff(static.packed[1]) / 8.0, 1.0)
         self._cells = np.append(0.0, np.cumsum(cells))  # of the parts before each
 
     def make(self, stopped: Callable[[], bool]) -> FloatArray | None:
@@ -115,10 +118,16 @@ class _WallWeights:
                 last = int(np.searchsorted(self._cells, most, "right")) - 1
                 last = min(max(last, self._done + 1), self._done + _PIECE)
                 some = parts[self._done : last]
+                share = _PIECE_CELLS / max(self._cells[last] - self._cells[self._done], 1.0)
+                end = self._row + math.ceil(min(share, 1.0) * len(self._made[0]))
                 for (reach, weight), made in zip(self._terms, self._made, strict=True):
                     full = np.full(len(some), reach), np.full(len(some), weight)
-                    _add_weights(made, self._static.bounds, self._cell, some, *full)
-                self._done += len(some)
+                    rows = self._row, end
+                    _add_weights(made, self._static.bounds, self._cell, some, *full, rows)
+                self._row = end
+                if end >= len(self._made[0]):
+                    self._row = 0
+                    self._done += len(some)
         return self._whole
 
     @functools.cached_property
@@ -141,11 +150,15 @@ def _add_weights(
     shapes: Sequence[FloatArray],
     reach: FloatArray,
     weight: FloatArray,
+    rows: tuple[int, int] | None = None,
 ) -> None:
-    """Add the weight of each shape to the cells within its reach [m]."""
+    """Add the weight of each shape to the cells within its reach [m], of some rows or of all."""
     vertices, offsets = flatten(shapes)
     boxes = outline_boxes(vertices, offsets) + reach[:, None] * [-1.0, -1.0, 1.0, 1.0]
     within = ((boxes - np.tile(bounds[:2], 2)) / cell).astype(np.int64)
+    if rows is not None:
+        within[:, 1] = np.maximum(within[:, 1], rows[0])
+        within[:, 3] = np.minimum(within[:, 3], rows[1] - 1)
     x, y = bounds[:2]
     core.add_cell_weights(weights, x, y, cell, vertices, offsets, within, reach, weight)
 

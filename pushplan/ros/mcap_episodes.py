@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.files.safe_files import MAX_BYTES, parse_json, read_bytes
+from pushplan.files.safe_files import MAX_BYTES, name_unused, parse_json, read_bytes
 from pushplan.imports.on_demand import need
 from pushplan.ros.mcap_writer import (
     COMMAND,
@@ -76,6 +76,7 @@ def _messages(path: Path) -> Mapping[str, list[Any]]:
     types = RosbagsTypes()
     data = read_bytes(path, "log")
     channels: dict[int, Any] = {}
+    unused = set[str]()
     messages = []
     by_topic = defaultdict[str, list[Any]](list)
     with _whole(path):
@@ -85,14 +86,17 @@ def _messages(path: Path) -> Mapping[str, list[Any]]:
                 channels[record.id] = record
             elif kind == "Message" and channels[record.channel_id].topic in _READ:
                 messages.append(record)
-            elif kind == "Metadata":
-                by_topic[record.name].append(record.metadata)
+            elif kind == "Metadata" and record.name == DROPPED:
+                by_topic[DROPPED].append(record.metadata)
+            elif kind in ("Metadata", "Attachment"):
+                unused.add(f"{kind.lower()} {record.name}")
     found = {channel.topic: channel for channel in channels.values()}
     if WORLD not in found or found[WORLD].metadata.get("schema") != SCHEMA:
         raise SchemaError(
             f"{path} is no log of this version of pushplan: it needs topic {WORLD} with schema "
             f"{SCHEMA!r}, found {', '.join(sorted(found)) or 'no topic'}"
         )
+    name_unused(str(path), unused | {f"topic {topic}" for topic in found.keys() - TOPICS.keys()})
     with _whole(path):
         for message in sorted(messages, key=lambda message: message.log_time):
             topic = channels[message.channel_id].topic

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from operator import attrgetter
 from pathlib import Path
@@ -16,13 +16,21 @@ import shapely
 from numpy.typing import ArrayLike
 
 from pushplan.errors import short
-from pushplan.files.safe_files import known_keys, read_data, read_npy, read_npz
+from pushplan.files.safe_files import known_keys, name_unused, read_data, read_npy, read_npz
 from pushplan.geometry import convex_penetration
 from pushplan.scenarios.ice_field import IceField
 from pushplan.world import InvalidInputError, SchemaError
-from pushplan.world.checks import FloatArray, IntArray, array, checked_bounds, expect
+from pushplan.world.checks import (
+    FloatArray,
+    IntArray,
+    array,
+    checked_bounds,
+    choice,
+    expect,
+    number,
+)
 from pushplan.world.convex_shapes import hull_of, listed_corners, shapes_of
-from pushplan.world.outline import ConvexParts, flatten, outline_boxes
+from pushplan.world.outline import ConvexParts, flatten, outline_boxes, transform
 from pushplan.world.outline_repair import OutlineWarning
 
 SCHEMA = "pushplan-ice/1"
@@ -34,6 +42,9 @@ _GAP_RADII = 1e-3  # that is left between floes that were moved apart; of the sm
 _MOST_TESTS = 300_000  # of pairs of parts, when floes are moved apart
 _PATIENCE = 40  # rounds in which the deepest overlap has to become less,
 _LESS = 0.99  # by this factor
+_EDGES = ("bounds", "water")
+_PLACED = ("location", "perimeter", "yaw", "type")
+"""Keys of a floe of the National Research Council of Canada that are used."""
 _WAY_ON = "overlaps=True (--overlaps, the variation ice_overlaps) leaves them as they are"
 
 
@@ -43,16 +54,21 @@ def load_ice(
     hull: bool = False,
     overlaps: bool = False,
     within: ArrayLike | None = None,
+    place: Callable[[FloatArray], FloatArray] | None = None,
 ) -> IceField:
     """Read an ice field.
 
     - ``.json``: a list of polygons, each a list of [x, y] corners [m]; or a mapping with
-      ``polygons``, and ``bounds`` and ``schema`` if you like; or the fields of the National
-      Research Council of Canada, a mapping with ``ice``, each floe of it with ``location`` [x, y]
-      and ``perimeter``, the corners relative to it.
+      ``polygons``, and ``schema`` and ``bounds`` or ``water`` if you like; or the fields of the
+      National Research Council of Canada, a mapping with ``ice``, each floe of it with ``location``
+      [x, y], ``perimeter``, the corners relative to it, and ``yaw``, their turn about it [degrees];
+      ``field_size`` in its ``properties`` is the ``water``, from the origin on.
     - ``.npz``: arrays ``vertices`` (V, 2) [m] and ``offsets`` (K + 1,), where each floe starts in
-      them and the last ends, and ``bounds`` if you like.
+      them and the last ends, and ``bounds`` or ``water`` if you like.
     - ``.npy``: an array (K, N, 2) of K floes with N corners each.
+
+    Floes must lie within ``bounds``; they may reach across the edge of ``water``. An
+    `UnusedInputWarning` names the keys of a floe or of ``properties`` that are not used.
 
     Floes need not be convex; a list of outlines in place of one is a floe of several parts. They
     are repaired and cut into convex parts as `pushplan.world.outline_repair.outline_parts` says.
@@ -66,6 +82,7 @@ def load_ice(
         overlaps: leave floes that overlap where they are, as those of the 2D benchmark are.
         within: (4,) x_min, y_min, x_max, y_max to which floes may be moved [m]; the bounds that the
             file states if None, or else anywhere.
+        place: gives the pose (3,) at which the field is put, for the water (4,) that a file states.
 
     Raises:
         SchemaError: if the file cannot be read or has another form.
@@ -80,17 +97,24 @@ def load_ice(
             f"got {str(path)!r}"
         )
     try:
-        polygons, bounds = _READERS[path.suffix.lower()](path)
+        polygons, stated = _READERS[path.suffix.lower()](path)
     except SchemaError:
         raise
     except InvalidInputError as error:
         raise SchemaError(f"{path}: {error}") from error
     try:
         floes = _floes(polygons, hull)
-        field = IceField(tuple(floes), _bounds(floes, bounds))
-        _check_inside(field)
+        if stated.keys() >= {*_EDGES}:
+            raise InvalidInputError("a field states its bounds or its water, got both")
+        water = stated.get("water")
+        room = stated.get("bounds", water)
+        field = IceField(tuple(floes), _bounds(floes, room))
+        if water is None:
+            _check_inside(field)
+        elif place is not None:
+            field = _put(field, place(field.bounds))
         if not overlaps:
-            room = bounds if within is None else within
+            room = room if within is None else within
             field = _apart(field, None if room is None else checked_bounds("within", room))
         return field
     except InvalidInputError as error:
@@ -105,11 +129,12 @@ def save_ice(field: IceField, path: str | Path) -> None:
     """
     path = _path(path)
     ending = path.suffix.lower()
+    edge = "water" if len(_outside(field)) else "bounds"
     try:
         if ending == ".json":
             data = {
                 "schema": SCHEMA,
-                "bounds": field.bounds.tolist(),
+                edge: field.bounds.tolist(),
                 "polygons": [listed_corners(parts) for parts in field.floes],
             }
             path.write_text(json.dumps(data) + "\n", encoding="utf-8")
@@ -118,7 +143,7 @@ def save_ice(field: IceField, path: str | Path) -> None:
             arrays: dict[str, Any] = {
                 "vertices": vertices,
                 "offsets": offsets,
-                "bounds": field.bounds,
+                edge: field.bounds,
             }
             if len(offsets) != len(field) + 1:
                 arrays["first_parts"] = np.cumsum([0, *map(len, field.floes)])
@@ -138,44 +163,53 @@ def _path(path: object) -> Path:
     return Path(path)
 
 
-def _read_json(path: Path) -> tuple[Sequence[Any], object]:
+def _read_json(path: Path) -> tuple[Sequence[Any], Mapping[str, Any]]:
     data = read_data(path, "ice field")
-    bounds: object = None
+    kind = f"ice field {path}"
+    stated: Mapping[str, Any] = {}
     if isinstance(data, Mapping) and "ice" in data:
-        known_keys(f"ice field {path}", data, ("ice", "properties"), ("ice",))
-        return _placed(data["ice"]), None
+        return _placed(kind, known_keys(kind, data, ("ice", "properties"), ("ice",)))
     if isinstance(data, Mapping):
-        known_keys(f"ice field {path}", data, ("schema", "bounds", "polygons"), ("polygons",))
+        stated = known_keys(kind, data, ("schema", "polygons", *_EDGES), ("polygons",))
         if data.get("schema", SCHEMA) != SCHEMA:
             raise SchemaError(
                 f"{path}: this pushplan reads schema {SCHEMA!r}, got {short(data['schema'])}"
             )
-        bounds = data.get("bounds")
         data = data["polygons"]
     if not isinstance(data, list):
         raise SchemaError(f"{path}: polygons must be a list of lists of corners, got {short(data)}")
-    return data, bounds
+    return data, stated
 
 
-def _placed(floes: object) -> list[FloatArray]:
-    """Outlines that are stated relative to a place each."""
+def _placed(kind: str, data: Mapping[str, Any]) -> tuple[list[FloatArray], Mapping[str, Any]]:
+    """Outlines that are stated relative to a place and a heading each, and their water."""
     polygons = []
-    for name, floe in expect("ice", floes, dict).items():
-        known_keys(f"floe {name!r:.20}", floe, None, ("location", "perimeter"))
-        place = array(f"location of floe {name!r:.20}", floe["location"], (2,))
-        corners = array(f"perimeter of floe {name!r:.20}", floe["perimeter"], (None, 2))
-        polygons.append(corners + place)
-    return polygons
+    keys = set[str]()
+    for name, floe in expect("ice", data["ice"], dict).items():
+        called = f"floe {name!r:.20}"
+        keys.update(known_keys(called, floe, None, _PLACED[:2]))
+        choice(f"type of {called}", floe.get("type", "polygon"), ("polygon",))
+        place = array(f"location of {called}", floe["location"], (2,))
+        turn = math.radians(number(f"yaw of {called}", floe.get("yaw", 0.0)))
+        corners = array(f"perimeter of {called}", floe["perimeter"], (None, 2))
+        polygons.append(transform([*place, turn], corners))
+    properties = known_keys("properties", data.get("properties", {}), None, ())
+    unused = {f"properties.{key}" for key in properties.keys() - {"field_size"}}
+    name_unused(kind, unused | {f"floes.{key}" for key in keys - {*_PLACED}})
+    if "field_size" not in properties:
+        return polygons, {}
+    size = array("field_size", properties["field_size"], (2,))
+    return polygons, {"water": [0.0, 0.0, *size]}
 
 
-def _read_npz(path: Path) -> tuple[Sequence[Any], object]:
-    optional = ("bounds", "first_parts")
+def _read_npz(path: Path) -> tuple[Sequence[Any], Mapping[str, Any]]:
+    optional = (*_EDGES, "first_parts")
     arrays = read_npz(path, "ice field", ("vertices", "offsets"), optional, _MAX_BYTES)
     vertices = array("vertices", arrays["vertices"], (None, 2))
     parts = _groups(path, "offsets", arrays["offsets"], vertices, "vertices")
     if "first_parts" not in arrays:
-        return parts, arrays.get("bounds")
-    return _groups(path, "first_parts", arrays["first_parts"], parts, "parts"), arrays.get("bounds")
+        return parts, arrays
+    return _groups(path, "first_parts", arrays["first_parts"], parts, "parts"), arrays
 
 
 def _groups(path: Path, name: str, starts: Any, items: Any, what: str) -> list[Any]:
@@ -190,10 +224,10 @@ def _groups(path: Path, name: str, starts: Any, items: Any, what: str) -> list[A
     return [items[a:b] for a, b in pairwise(offsets.tolist())]
 
 
-def _read_npy(path: Path) -> tuple[Sequence[Any], object]:
+def _read_npy(path: Path) -> tuple[Sequence[Any], Mapping[str, Any]]:
     data = read_npy(path, "ice field")
     polygons: FloatArray = array("the array of polygons", data, (None, None, 2))
-    return list(polygons), None
+    return list(polygons), {}
 
 
 _READERS = {".json": _read_json, ".npz": _read_npz, ".npy": _read_npy}
@@ -220,15 +254,28 @@ def _boxes(floes: Sequence[ConvexParts]) -> FloatArray:
     return outline_boxes(*flatten([np.concatenate(parts) for parts in floes]))
 
 
-def _check_inside(field: IceField) -> None:
+def _outside(field: IceField) -> IntArray:
+    """Numbers of the floes that do not lie within the bounds."""
     slack = 1e-9 * float((field.bounds[2:] - field.bounds[:2]).max())
     boxes = _boxes(field.floes)
     within = (boxes[:, :2] >= field.bounds[:2] - slack) & (boxes[:, 2:] <= field.bounds[2:] + slack)
-    for i in np.flatnonzero(~within.all(axis=1)).tolist():
+    return np.flatnonzero(~within.all(axis=1))
+
+
+def _check_inside(field: IceField) -> None:
+    for i in _outside(field).tolist():
+        (box,) = _boxes(field.floes[i : i + 1])
         raise InvalidInputError(
             f"polygon {i} must lie within the bounds {field.bounds.tolist()}, "
-            f"it reaches from {boxes[i, :2].tolist()} to {boxes[i, 2:].tolist()}"
+            f"it reaches from {box[:2].tolist()} to {box[2:].tolist()}"
         )
+
+
+def _put(field: IceField, pose: FloatArray) -> IceField:
+    """The field at a pose (3,), a multiple of quarter turns."""
+    floes = [tuple(transform(pose, part) for part in parts) for parts in field.floes]
+    corners = transform(pose, field.bounds.reshape(2, 2))
+    return IceField(tuple(floes), np.concatenate([corners.min(axis=0), corners.max(axis=0)]))
 
 
 def _apart(field: IceField, room: FloatArray | None) -> IceField:
@@ -252,7 +299,10 @@ def _apart(field: IceField, room: FloatArray | None) -> IceField:
             shifts[a] -= share * way
             shifts[b] += (1.0 - share) * way
         if room is not None:
-            shifts = np.clip(shifts, room[:2] - boxes[:, :2], room[2:] - boxes[:, 2:])
+            # a floe that reaches across the edge may stay as far out as it is
+            least = np.minimum(room[:2] - boxes[:, :2], 0.0)
+            most = np.maximum(room[2:] - boxes[:, 2:], 0.0)
+            shifts = np.clip(shifts, least, most)
         count, pairs = _overlaps(field, boxes, shifts)
         tests += count
         depths.append(max((pair.depth for pair in pairs), default=0.0))

@@ -74,6 +74,8 @@ def load_bounds(path: str | Path) -> dict[str, KnownBounds]:
     found: dict[str, KnownBounds] = {}
     for row in reader:
         try:
+            if None in row:
+                raise ValueError(f"expected {len(_COLUMNS)} values")
             found[row["scenario"]] = KnownBounds(
                 float(row["robot_mass_kg"]),
                 float(row["bound_kg_m"]),

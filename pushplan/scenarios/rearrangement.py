@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 
 from pushplan.errors import InvalidInputError, SchemaError, short
-from pushplan.files.safe_files import known_keys, read_data
+from pushplan.files.safe_files import known_keys, name_unused, read_data
 from pushplan.world import Movables, ObjectGoals, RobotModel, ScenarioError, StaticMap, World
 from pushplan.world.checks import FloatArray, array, choice, integer, number
 from pushplan.world.outline import transform
@@ -141,16 +141,20 @@ def load_relopush(
     one = known_keys(
         name, data[at], ("objects", "robot", "goals", "raw_other"), ("objects", "robot", "goals")
     )
+    other = known_keys(f"{name}: raw_other", one.get("raw_other", {}), None, ())
     try:
-        pairs = list(map(tuple, one.get("raw_other", {}).get("assign", [])))
+        pairs = list(map(tuple, other.get("assign", [])))
         pairs = pairs or list(zip(one["objects"], one["goals"], strict=True))
         starts = np.array([array(b, pose, (3,)) for b, pose in one["objects"].items()])
         order = {b: k for k, b in enumerate(one["objects"])}
         ends = np.array([array(d, one["goals"][d], (3,)) for _, d in pairs])
         ids = np.array([order[b] for b, _ in pairs])
         pose = array("robot", one["robot"], (3,))
-        if len(set(pairs)) != len({d for _, d in pairs}) or not pairs:
+        taken = {d for _, d in pairs}
+        if len(set(pairs)) != len(taken) or not pairs:
             raise SchemaError(f"{name}: each goal needs an object of its own, got {short(pairs)}")
+        unused = {f"goals.{d}" for d in one["goals"].keys() - taken}
+        name_unused(name, unused | {f"raw_other.{key}" for key in other.keys() - {"assign"}})
     except InvalidInputError as error:
         raise SchemaError(f"{name}: {error}") from error
     except (KeyError, TypeError, ValueError, AttributeError) as error:

@@ -10,7 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from pushplan.files.safe_files import read_data
+from pushplan.files.safe_files import known_keys, read_data
 from pushplan.scenarios.scenario import Scenario
 from pushplan.world import SchemaError, UnknownNameError
 from pushplan.world.checks import integer
@@ -115,7 +115,8 @@ def suite(name: str, *, episodes: int | None = None, first_seed: int = 0) -> Sui
     table = _table()
     if not isinstance(name, str) or name not in table:
         raise UnknownNameError("suite", name, table)
-    entry = table[name]
+    keys = ("episodes", "starts", "version")
+    entry = known_keys(f"suite {name!r}", table[name], keys, keys)
     count = entry["episodes"]
     if episodes is not None:
         count = integer("episodes", episodes, low=1, high=MOST_EPISODES)

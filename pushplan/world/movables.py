@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Annotated, Any
 
@@ -28,6 +28,7 @@ from pushplan.world.outline import (
     ConvexParts,
     areas_and_centroids,
     convex_outline,
+    enclosing_outline,
     flatten,
     grown_outlines,
     transform,
@@ -36,7 +37,7 @@ from pushplan.world.outline import (
     well_formed,
 )
 
-_OF_SHAPES = ("_contact_parts", "_contact_hulls", "_areas_and_centres")
+_OF_SHAPES = ("_contact_parts", "_contact_hulls", "_areas_and_centres", "_few_corners")
 """Caches that do not depend on poses."""
 _ONE_EACH = ("poses", "twists", "masses", "wheeled", "contact_radii", "fixed", "gyration_radii")
 
@@ -385,6 +386,18 @@ class Movables(ArrayRecord, CheckedFields):
         """The same objects, of which those flagged in (K,) are held not to move."""
         flags = array("movables.fixed", fixed, (len(self),), dtype=np.bool_)
         return self._unchecked({**self.__dict__, "fixed": flags})
+
+    @cached_property
+    def _few_corners(self) -> tuple[FloatArray, IntArray]:
+        return flatten(
+            [*map(enclosing_outline, unflatten(self.drawn_vertices, self.drawn_offsets))]
+        )
+
+    def with_few_corners(self) -> Movables:
+        """The objects with each part as `pushplan.world.outline.enclosing_outline` makes it."""
+        values = {one.name: getattr(self, one.name) for one in fields(self)}
+        values["drawn_vertices"], values["drawn_offsets"] = map(frozen, self._few_corners)
+        return self._unchecked(values)
 
     def select(self, keep: ArrayLike) -> Movables:
         """The objects whose index or flag is in ``keep``."""

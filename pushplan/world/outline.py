@@ -15,6 +15,9 @@ from pushplan.world.checks import BoolArray, FloatArray, IntArray, array, frozen
 ConvexParts = tuple[FloatArray, ...]
 """Convex outlines, counter-clockwise, each (N, 2) [m]; the shape is their union."""
 
+MOST_CORNERS = 1000
+"""Corners of an outline that planners work with at most."""
+_ALIKE = 4.0  # heights of edges over their median that are left out in one round
 LARGEST_M = 1e70
 """Greatest coordinate [m]: its fourth power is finite still."""
 
@@ -184,6 +187,38 @@ def grown_outlines(
     keep = np.column_stack([np.ones(len(corners), dtype=np.bool_), sharp & (margin[:, 0] > 0.0)])
     grown_offsets: IntArray = np.concatenate([[0], np.cumsum(keep.sum(axis=1))])[offsets]
     return np.stack([first, second], axis=1)[keep], grown_offsets
+
+
+def enclosing_outline(corners: FloatArray) -> FloatArray:
+    """A convex outline around another one (N, 2) [m], with at most `MOST_CORNERS` corners.
+
+    It is the outline itself if that has no more; the radius of a circle becomes a hundred
+    thousandth greater. Edges are left out whose neighbours meet nearest to them, in rounds of at
+    most every other one.
+    """
+    while len(corners) > MOST_CORNERS:
+        points = corners[:, 0] + 1j * corners[:, 1]
+        edges = np.roll(points, -1) - points
+        along = edges / np.abs(edges)
+        last = np.roll(along, 1)
+        following = np.roll(along, -1)
+        # their imaginary parts are the sines of the turns
+        before, after, both = last.conj() * along, along.conj() * following, last.conj() * following
+        fit = (before.imag >= 0.0) & (after.imag >= 0.0) & (both.real > 0.0)
+        # how far from its beginning the neighbours of an edge meet: at its end if it is straight
+        share = np.divide(after.imag, both.imag, out=np.ones(len(edges)), where=both.imag > 0.0)
+        reach = np.abs(edges) * share
+        heights = np.where(fit, reach * before.imag, np.inf)
+        limit = _ALIKE * float(np.median(heights))
+        if limit == np.inf:
+            break
+        halves = [np.arange(first, len(edges) - 1, 2) for first in (0, 1)]
+        low = max((half[heights[half] <= limit] for half in halves), key=len)
+        low = low[np.argsort(heights[low], kind="stable")[: len(edges) - MOST_CORNERS]]
+        points[low] += reach[low] * last[low]
+        points = np.delete(points, low + 1)
+        corners = np.column_stack([points.real, points.imag])
+    return corners
 
 
 def listed(name: str, outlines: Sequence[Any]) -> Sequence[Any]:

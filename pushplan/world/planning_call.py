@@ -21,8 +21,7 @@ class PlanningCall:
     """One call of a planner, from the time when this object is made.
 
     Args:
-        world: as in `pushplan.world.Planner.plan`; objects that are held not to move are static in
-            the call's own.
+        world: as in `pushplan.world.Planner.plan`; the call's own is `World.for_planning`.
         stop: likewise.
         rng: likewise.
         default: the stop rule where none is given; nothing ends the call where this is None too.
@@ -35,7 +34,7 @@ class PlanningCall:
         self, world: object, stop: object, rng: object, default: Stop | None = None
     ) -> None:
         self.began = time.perf_counter()
-        self.world: World = expect("world", world, World).with_fixed_as_static()
+        scene = expect("world", world, World)
         given, generator = check_rules(stop, rng)
         self.rng = np.random.default_rng(0) if generator is None else generator
         own = wants_own_budget(given)
@@ -45,6 +44,7 @@ class PlanningCall:
         if own and default is not None:  # `OwnBudget` in a rule stands for the default
             self._rule = default if given is None else AnyOf((given, default))
         self.arm()
+        self.world = scene.for_planning()
 
     def arm(self) -> None:
         """Start the stop rule; again after what a process does in its first call only."""

@@ -21,7 +21,7 @@ from pushplan.world.goals import (
     ObjectGoals,
 )
 from pushplan.world.movables import Movables
-from pushplan.world.outline import transform
+from pushplan.world.outline import MOST_CORNERS, enclosing_outline, transform
 from pushplan.world.price_map import PriceMap
 from pushplan.world.robot import RobotModel
 from pushplan.world.static_map import StaticMap
@@ -188,6 +188,18 @@ class World(ArrayRecord, CheckedFields):
         solid = _with_objects(self.static, self.movables.select(fixed))
         return replace(self, static=solid, movables=self.movables.select(~fixed))
 
+    def for_planning(self) -> World:
+        """The same scene as planners take it: what is fixed is static, outlines have few corners.
+
+        See `pushplan.world.outline.enclosing_outline`.
+        """
+        world = self.with_fixed_as_static()
+        if max(map(len, world.static.polygons), default=0) > MOST_CORNERS:
+            world = replace(world, static=_with_few_corners(world.static))
+        if np.diff(world.movables.drawn_offsets).max(initial=0) > MOST_CORNERS:
+            world = replace(world, movables=world.movables.with_few_corners())
+        return world
+
     @property
     def goal_reached(self) -> bool:
         """True if the robot, or every object, is where the goal wants it.
@@ -259,4 +271,10 @@ def _with_objects(static: StaticMap, objects: Movables) -> StaticMap:
     """A map with objects among what is static; the same one for the same objects."""
     parts = [part for k in range(len(objects)) for part in objects.parts_world(k)]
     polygons = (*static.polygons, *parts)
+    return StaticMap(polygons, static.segments, static.radii, static.bounds)
+
+
+@functools.lru_cache(maxsize=8)
+def _with_few_corners(static: StaticMap) -> StaticMap:
+    polygons = tuple(map(enclosing_outline, static.polygons))
     return StaticMap(polygons, static.segments, static.radii, static.bounds)

@@ -1,8 +1,10 @@
 """Ship-Ice: starts, rewards and ends, ice from files, observations."""
 
+import json
 import math
 import os
 import pickle
+import warnings
 
 import gymnasium
 import numpy as np
@@ -250,6 +252,45 @@ def test_ice_from_a_file_must_fit(tmp_path):
     with pytest.raises(ScenarioError, match="cannot read ice field"):
         task(ice_file=str(hostile))
     assert not mark.exists()
+
+
+def nrc(path, size, floes):
+    """A field in the form of the National Research Council of Canada, which runs along x."""
+    square = [[-2, -1], [2, -1], [2, 1], [-2, 1]]
+    ice = {str(k): {"location": at, "perimeter": square} for k, at in enumerate(floes)}
+    path.write_text(json.dumps({"properties": {"field_size": size}, "ice": ice}))
+    return str(path)
+
+
+def test_a_field_that_states_its_water_is_turned_and_moved_into_the_channel(tmp_path):
+    path = nrc(tmp_path / "field.json", [900, 100], [[10, 20], [890, 0], [-5, 99]])
+    ship = task("full_scale", ice_file=path)
+    # x of the file runs ahead; the ice begins at y = 150 m, midway in 200 m
+    boxes = [(129, 158, 131, 162), (149, 1038, 151, 1042), (50, 143, 52, 147)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = [floe.bounds for floe in floes(ship.start(stream(0, "layout")))]
+    np.testing.assert_allclose(found, boxes, atol=1e-9)
+    env = make(Scenario("ship_ice", preset="full_scale", variations={"ice_file": path}))
+    env.reset()
+    env.step(np.zeros(env.action_space.shape, np.float32))
+    # a field that lies in the channel stays where it is
+    path = nrc(tmp_path / "small.json", [12, 20], [[6, 5], [0, 15]])
+    found = [floe.bounds for floe in floes(task(ice_file=path).start(stream(0, "layout")))]
+    np.testing.assert_allclose(found, [(4, 4, 8, 6), (-2, 14, 2, 16)], atol=1e-9)
+
+
+def test_a_field_that_does_not_fit_says_what_would(tmp_path):
+    path = nrc(tmp_path / "field.json", [900, 100], [[10, 20]])
+    with pytest.raises(ScenarioError, match=r"100 x 900 m does not fit.*wide enough: full_scale;"):
+        task(ice_file=path)
+    path = nrc(tmp_path / "long.json", [1200, 100], [[10, 20]])
+    with pytest.raises(ScenarioError, match="channel_length .* 1450 m"):
+        task("full_scale", ice_file=path)
+    task("full_scale", ice_file=path, channel_length=1450.0)
+    path = nrc(tmp_path / "wide.json", [1200, 300], [[10, 20]])
+    with pytest.raises(ScenarioError, match="presets that are wide enough: none"):
+        task("full_scale", ice_file=path)
 
 
 @pytest.mark.parametrize("preset", PRESETS)

@@ -6,6 +6,7 @@ import json
 import os
 import pickle
 import time
+import warnings
 import zipfile
 
 import numpy as np
@@ -67,17 +68,46 @@ def test_floes_of_any_shape_and_their_hulls(tmp_path):
     assert load_ice(path, hull=True).areas.tolist() == pytest.approx([1.0, 2.0, 3.0])
 
 
+def nrc(floes, **properties):
+    """The text of a field in the form of the National Research Council of Canada."""
+    ice = {str(k): {"perimeter": corners, **more} for k, (corners, more) in enumerate(floes)}
+    return json.dumps({"properties": properties, "ice": ice})
+
+
+def overlaps(field):
+    shapes = [shapely.union_all([shapely.Polygon(part) for part in floe]) for floe in field.floes]
+    return [
+        (i, j)
+        for (i, a), (j, b) in itertools.combinations(enumerate(shapes), 2)
+        if a.intersection(b).area > 1e-9
+    ]
+
+
 def test_fields_of_the_national_research_council(tmp_path):
     path = tmp_path / "field.json"
     near = [[0.0, 0.0], [1e-9, 1e-10], *SQUARE[1:]][::-1]
-    floes = {str(k): {"location": [3 * k, 5], "perimeter": near, "yaw": 9} for k in range(3)}
-    path.write_text(json.dumps({"properties": {"field_size": [9, 9]}, "ice": floes}))
+    path.write_text(nrc([(near, {"location": [3 * k, 5], "yaw": 90}) for k in range(3)]))
     field = load_ice(path)
-    assert field.bounds.tolist() == [0.0, 5.0, 7.0, 6.0]
+    assert field.bounds.tolist() == pytest.approx([-1.0, 5.0, 6.0, 6.0])
     assert field.areas.tolist() == pytest.approx([1.0] * 3)
+    long = [[-4.0, -1.0], [4.0, -1.0], [4.0, 1.0], [-4.0, 1.0]]
+    turned = [(long, {"location": [4 * k, 0], "yaw": yaw}) for k, yaw in enumerate((90, -90, 450))]
+    path.write_text(nrc([*turned, (long, {"location": [16.1, 0]})]))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        field = load_ice(path)  # and nothing is moved apart
+    assert not overlaps(field) and field.areas.tolist() == pytest.approx([16.0] * 4)
+    path.write_text(nrc([(long, {"location": [3, 3], "yaw": 30})]))
+    ((corners,),) = load_ice(path).floes
+    assert corners[0].tolist() == pytest.approx([3.0 - 2 * 3**0.5 + 0.5, 3.0 - 2.0 - 0.5 * 3**0.5])
     for broken, problem in (
         ({"location": [0, 0]}, "floe '1' lacks the required key 'perimeter'"),
         ({"location": [0], "perimeter": near}, "location of floe '1' must have shape"),
+        (
+            {"location": [0, 0], "perimeter": near, "yaw": "east"},
+            "yaw of floe '1' must be a number",
+        ),
+        ({"location": [0, 0], "perimeter": near, "type": "disc"}, "type of floe '1'.*polygon"),
         (3, "floe '1' must be a mapping"),
     ):
         path.write_text(json.dumps({"ice": {"1": broken}}))
@@ -85,6 +115,26 @@ def test_fields_of_the_national_research_council(tmp_path):
             load_ice(path)
     path.write_text('{"ice": []}')
     with pytest.raises(InvalidInputError, match="ice must be a dict"):
+        load_ice(path)
+
+
+def test_floes_may_reach_across_the_edge_of_their_water(tmp_path):
+    path = tmp_path / "field.json"
+    floes = [(SQUARE, {"location": at}) for at in ([-0.5, 3], [9.5, 3], [9.4, 3.5], [20, 3])]
+    path.write_text(nrc(floes, field_size=[10, 5]))
+    apart = pytest.warns(OutlineWarning, match="in 1 places")
+    with apart:
+        field = load_ice(path)
+    assert field.bounds.tolist() == [0, 0, 10, 5] and not overlaps(field)
+    # those that need not be moved stay where they are
+    assert field.floes[0][0].min() == -0.5 and field.floes[3][0].max() == 21.0
+    for name in ("again.json", "again.npz"):
+        save_ice(field, tmp_path / name)
+        assert load_ice(tmp_path / name) == field
+    path.write_text(
+        json.dumps({"polygons": [SQUARE], "bounds": [0, 0, 1, 1], "water": [0, 0, 1, 1]})
+    )
+    with pytest.raises(InvalidInputError, match="its bounds or its water, got both"):
         load_ice(path)
 
 

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from PIL import Image
 
+from pushplan.files.safe_files import UnusedInputWarning
 from pushplan.world import (
     InvalidInputError,
     SchemaError,
@@ -208,9 +209,10 @@ def test_pictures_of_every_kind_have_the_grey_values_of_graphicsmagick(tmp_path)
     assert read(b"P1 3 1\n0 1 1\n", "map.pgm") == [[-1, 0, 0]]
 
 
-def test_keys_that_nav2_does_not_know_are_ignored(tmp_path):
+def test_keys_that_nav2_does_not_know_are_allowed_and_named(tmp_path):
     path = write(tmp_path, [[0, 254]], map_type="occupancy", note="hall 3")
-    assert read_nav2_grid(path)[0].tolist() == [[100, 0]]
+    with pytest.warns(UnusedInputWarning, match=r"not used: map_type, note$"):
+        assert read_nav2_grid(path)[0].tolist() == [[100, 0]]
 
 
 def test_a_map_of_single_cells_is_refused_in_one_line(monkeypatch):

@@ -126,7 +126,7 @@ class ShipIceTask(Task):
         self._file_ice = self._read_ice()
 
     def _read_ice(self) -> IceField | None:
-        """The floes of the file, which must lie in the channel."""
+        """The floes of the file, which must lie in the channel, or the water that it states."""
         path = self.variations.ice_file
         if path is None:
             return None
@@ -137,19 +137,52 @@ class ShipIceTask(Task):
                 hull=self.variations.ice_hull,
                 overlaps=self.may_overlap,
                 within=self.static.bounds,
+                place=self._place,
             )
         except InvalidInputError as error:
             raise ScenarioError(f"ship_ice: {error}") from error
         low = self.static.bounds[:2]
         high = self.static.bounds[2:]
-        for i, parts in enumerate(field.floes):
+        for i, parts in enumerate(() if self._in_channel(field.bounds) else field.floes):
             corners = np.concatenate(parts)
             if (corners < low - 1e-9).any() or (corners > high + 1e-9).any():
                 raise ScenarioError(
                     f"ship_ice: {path}: polygon {i} must lie in the channel, x in [0, {high[0]:g}] "
-                    f"and y in [0, {high[1]:g}] m"
+                    f"and y in [0, {high[1]:g}] m; a field that states its water (field_size) is "
+                    "turned and moved into it, and its floes may reach across the sides"
                 )
         return field
+
+    def _in_channel(self, bounds: FloatArray) -> bool:
+        beyond = (bounds - self.static.bounds) * (-1.0, -1.0, 1.0, 1.0)
+        return bool((beyond <= 1e-9).all())
+
+    def _place(self, water: FloatArray) -> FloatArray:
+        """Pose (3,) at which a field with this water (4,) [m] lies in the channel.
+
+        It stays where it is if it lies in the channel. Otherwise it begins where the preset's ice
+        does, midway between the sides; its longer side runs along the channel.
+        """
+        if self._in_channel(water):
+            return np.zeros(3)
+        width, length = (water[2:] - water[:2]).tolist()
+        low = water[:2]
+        turn = 0.0
+        if width > length:
+            width, length = length, width
+            low = np.array([-water[3], water[0]])
+            turn = _UP
+        ice = self.ice_bounds
+        most = ice[2:] - ice[:2]
+        if width <= most[0] and length <= most[1]:
+            return np.array([*((0.5 * (most[0] - width), ice[1]) - low), turn])
+        wide = [name for name, preset in PRESETS.items() if preset.channel[0] >= width]
+        longest = self.static.bounds[3] - most[1] + max(length, most[1])
+        raise InvalidInputError(
+            f"its water of {width:g} x {length:g} m does not fit in the ice field of {most[0]:g} x "
+            f"{most[1]:g} m; presets that are wide enough: {', '.join(wide) or 'none'}; "
+            f"channel_length of this one for the length: {longest:g} m"
+        )
 
     def start(self, rng: np.random.Generator) -> World:
         """A new start: the ship on the start line, then ice that leaves it some room."""

@@ -50,7 +50,7 @@ class DiscSpace:
             goal = GoalDisc(goal.center, _NEAR_POSE * cell)
         self.goal: BoolArray = goal.contains(np.stack([x, y], axis=-1))
         clearance_at = functools.partial(
-            _clearance_at, world.movables, self.grid, self.radius + self.cell
+            _clearance_at, world.movables, self.grid, self.radius + self.cell, stopped
         )
         self._clearance = functools.lru_cache(_KEPT)(clearance_at)
 
@@ -86,9 +86,16 @@ class DiscSpace:
 
 
 def _clearance_at(
-    movables: Movables, grid: Grid, reach: float, k: int, x: float, y: float, theta: float
+    movables: Movables,
+    grid: Grid,
+    reach: float,
+    stopped: Callable[[], bool],
+    k: int,
+    *pose: float,
 ) -> FloatArray:
-    return object_clearance(movables, k, np.array([x, y, theta]), grid, reach)
+    field = object_clearance(movables, k, np.array(pose), grid, reach, stopped)
+    go_on(stopped)  # half a field is not kept
+    return field
 
 
 class DiscState:
@@ -112,7 +119,9 @@ class DiscState:
         for k, pose in enumerate(poses):
             go_on(space.stopped)
             np.minimum(self.clearance, space.object_clearance(k, pose), out=self.clearance)
+        go_on(space.stopped)
         self.free = FreeComponents.of(space.grid, self.clearance, space.radius)
+        go_on(space.stopped)
 
     @cached_property
     def reached(self) -> BoolArray:
@@ -153,6 +162,7 @@ class DiscState:
         self, weights: FloatArray, goals: BoolArray
     ) -> tuple[FloatArray, IntArray, IntArray]:
         space = self.space
+        go_on(space.stopped)
         start = np.array([space.number_of(self.robot)])
         found = grid_dijkstra(weights, start, goals, space.cell, space.stopped)
         go_on(space.stopped)

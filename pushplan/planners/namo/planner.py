@@ -64,6 +64,9 @@ class Namo:
     navigator: Planner = field(default_factory=lambda: make_planner("push-aware"))
 
     def __post_init__(self) -> None:
+        # the search needs it; its import must not take the time of the first call
+        import scipy.ndimage  # noqa: F401
+
         expect("config", self.config, NamoConfig)
         expect("interaction", self.interaction, InteractionModel)  # type: ignore[type-abstract]
         expect("navigator", self.navigator, Planner)  # type: ignore[type-abstract]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pushplan.errors import InvalidInputError, SchemaError, describe, short
-from pushplan.files.safe_files import known_keys, read_bytes, read_data
+from pushplan.files.safe_files import known_keys, name_unused, read_bytes, read_data
 from pushplan.imports.on_demand import need
 from pushplan.world.checks import (
     BoolArray,
@@ -57,7 +57,7 @@ def read_nav2_grid(path: str | Path) -> tuple[IntArray, float, FloatArray]:
     """The occupancy grid of a map: what ``nav2_map_server`` would publish for it.
 
     Thresholds, modes and opacity have the meaning of ``map_io.cpp`` from Nav2 Jazzy on. Keys that
-    it does not know are ignored.
+
 
     Returns:
         (rows, columns) -1 or 0 to 100, row 0 at the least y; the side of a cell [m]; (3,) x, y
@@ -70,6 +70,7 @@ def read_nav2_grid(path: str | Path) -> tuple[IntArray, float, FloatArray]:
     path = Path(path)
     try:
         known_keys("map file", data, None, _REQUIRED)
+        name_unused(f"map file {path}", data.keys() - {*_REQUIRED, "mode"})
         mode = choice("map mode", word("mode", data.get("mode", "trinary")).lower(), _MODES)
         negate = data["negate"]
         if negate not in (0, 1):
