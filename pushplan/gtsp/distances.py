@@ -92,7 +92,9 @@ class Distances:
         return self
 
     def __getitem__(self, key: Any) -> FloatArray:
-        rows, columns = key if isinstance(key, tuple) else (key[:, None], np.arange(len(self)))
+        if not isinstance(key, tuple):
+            key = key[:, None], np.arange(len(self))
+        rows, columns = key
         costs = _RULES[self._type](self._at[rows], self._at[columns])
         if self._type == "GEO":
             costs[rows == columns] = 0.0

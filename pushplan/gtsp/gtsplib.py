@@ -219,7 +219,8 @@ def read_gtsp(path: str | Path) -> GtspInstance:
     clusters = _clusters(text, size)
     name, _ = text.keywords.get("NAME", (text.path.stem, 0))
     comment, _ = text.keywords.get("COMMENT", ("", 0))
-    given = _matrix(text, size) if kind == "EXPLICIT" else _points(text, size)
+    read = _matrix if kind == "EXPLICIT" else _points
+    given = read(text, size)
     text.name_unused()
     try:
         if kind == "EXPLICIT":

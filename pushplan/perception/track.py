@@ -75,7 +75,9 @@ class Axis:
         gain = before / total
         # The mean rate since the last observation bounds the correction. A higher gain, which is
         # best for white accelerations, overshoots where an object stops at once.
-        rate_gain = shared / total if seconds * shared <= before else gain / seconds
+        rate_gain = shared / total
+        if seconds * shared > before:
+            rate_gain = gain / seconds
         self._variance = (1.0 - gain) * before
         self._shared = (1.0 - gain) * shared
         self._of_rate = of_rate - rate_gain * (2.0 * shared - rate_gain * total)

@@ -203,7 +203,9 @@ def enclosing_outline(corners: FloatArray) -> FloatArray:
         last = np.roll(along, 1)
         following = np.roll(along, -1)
         # their imaginary parts are the sines of the turns
-        before, after, both = last.conj() * along, along.conj() * following, last.conj() * following
+        before = last.conj() * along
+        after = along.conj() * following
+        both = last.conj() * following
         fit = (before.imag >= 0.0) & (after.imag >= 0.0) & (both.real > 0.0)
         # how far from its beginning the neighbours of an edge meet: at its end if it is straight
         share = np.divide(after.imag, both.imag, out=np.ones(len(edges)), where=both.imag > 0.0)
@@ -288,7 +290,8 @@ def well_formed(vertices: FloatArray, offsets: IntArray) -> BoolArray:
     good &= 0.5 * np.add.reduceat(twice, starts) > least_area
     good &= np.minimum.reduceat(np.hypot(edges[:, 0], edges[:, 1]), starts) > least
     good &= np.minimum.reduceat(cross, starts) >= -least_area
-    good &= np.abs(np.add.reduceat(turns, starts) - 2.0 * np.pi) <= 1e-6
+    # dents between many short edges are small one by one, but not together
+    good &= np.abs(np.add.reduceat(np.abs(turns), starts) - 2.0 * np.pi) <= 1e-6
     return good
 
 

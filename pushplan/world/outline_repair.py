@@ -187,7 +187,8 @@ def _check_crossings(name: str, shapes: Any) -> None:
     most = _CROSSINGS[0] + _CROSSINGS[1] * count
     if count * count <= most:
         return
-    a, b = points[begins], points[begins + 1]
+    a = points[begins]
+    b = points[begins + 1]
     edges = shapely.linestrings(np.stack([a, b], axis=1))
     tree = shapely.STRtree(edges)
     near = crossings = 0
@@ -195,7 +196,7 @@ def _check_crossings(name: str, shapes: Any) -> None:
         i, j = tree.query(edges[first : first + _EDGES_AT_ONCE])
         i += first
         near += len(i)
-        i, j = i[i < j], j[i < j]
+        i, j = np.stack([i, j])[:, i < j]
         apart = _side(a[i], b[i], a[j]) * _side(a[i], b[i], b[j]) < 0.0
         apart &= _side(a[j], b[j], a[i]) * _side(a[j], b[j], b[i]) < 0.0
         crossings += int(np.count_nonzero(apart))
@@ -209,7 +210,8 @@ def _check_crossings(name: str, shapes: Any) -> None:
 
 def _side(start: FloatArray, end: FloatArray, point: FloatArray) -> FloatArray:
     """1 where points (N, 2) are to the left of lines through two others, -1 to the right."""
-    along, away = (end - start).T, (point - start).T
+    along = (end - start).T
+    away = (point - start).T
     sides: FloatArray = np.sign(along[0] * away[1] - along[1] * away[0])
     return sides
 

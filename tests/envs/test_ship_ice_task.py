@@ -285,7 +285,7 @@ def test_a_field_that_does_not_fit_says_what_would(tmp_path):
     with pytest.raises(ScenarioError, match=r"100 x 900 m does not fit.*wide enough: full_scale;"):
         task(ice_file=path)
     path = nrc(tmp_path / "long.json", [1200, 100], [[10, 20]])
-    with pytest.raises(ScenarioError, match="channel_length .* 1450 m"):
+    with pytest.raises(ScenarioError, match=r"channel_length .* 1450 m"):
         task("full_scale", ice_file=path)
     task("full_scale", ice_file=path, channel_length=1450.0)
     path = nrc(tmp_path / "wide.json", [1200, 300], [[10, 20]])

@@ -68,6 +68,14 @@ HALF = np.array([[1.0, 0.0], [0.248, 0.429], [-0.5, 0.866], [-0.495, 0.0]])
 DENTED = np.vstack([HALF, HALF[2:0:-1] * [1.0, -1.0]])
 
 
+def test_dents_between_thousands_of_short_edges_are_kept():
+    angles = np.arange(9000) * 2 * np.pi / 9000
+    radii = 3.0 + 0.06 * np.cos(12 * angles)
+    wavy = radii[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+    (area,) = Movables.from_polygons([wavy], density=1.0).areas
+    assert area == pytest.approx(shapely.Polygon(wavy).area, rel=1e-9)
+
+
 def test_every_door_keeps_a_shallow_dent():
     area = shapely.Polygon(DENTED).area
     limits = {"mass": 1, "drive": "differential", "max_speed": 1, "max_turn_rate": 1}

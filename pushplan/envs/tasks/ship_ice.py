@@ -165,11 +165,12 @@ class ShipIceTask(Task):
         """
         if self._in_channel(water):
             return np.zeros(3)
-        width, length = (water[2:] - water[:2]).tolist()
+        sides = water[2:] - water[:2]
+        width = float(sides.min())
+        length = float(sides.max())
         low = water[:2]
         turn = 0.0
-        if width > length:
-            width, length = length, width
+        if sides[0] > sides[1]:
             low = np.array([-water[3], water[0]])
             turn = _UP
         ice = self.ice_bounds
