@@ -18,10 +18,10 @@ from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.keep_out import keep_out
 from pushplan.planners.arguments import check_pusher
 from pushplan.planners.rearrangement.approach_lattice import ContactGrid, contact_grid
-from pushplan.planners.rearrangement.object_goal import make_object_goal
 from pushplan.planners.rearrangement.object_paths import (
     ObjectPaths,
     PushCostToGo,
+    make_object_goal,
     object_paths,
     push_cost_to_go,
 )
