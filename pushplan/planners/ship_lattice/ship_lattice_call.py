@@ -19,9 +19,9 @@ from pushplan.motion.keep_out import keep_out
 from pushplan.motion.room_ahead import Room, gets_away
 from pushplan.motion.speed_profile import check_turns, goal_is_outside, timed_plan, turning_radius
 from pushplan.motion.state_lattice.built_lattice import BuiltLattice
-from pushplan.motion.state_lattice.cost_map import FloeCosts
 from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
 from pushplan.motion.state_lattice.lattice_config import SPACING
+from pushplan.motion.state_lattice.lattice_map import FloeCosts
 from pushplan.motion.state_lattice.lattice_path import bare_path, lay_path
 from pushplan.motion.state_lattice.lattice_search import open_search, path_arcs
 from pushplan.motion.swept_path import SweptPath
