@@ -10,8 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from pushplan.motion.keep_out import keep_out
-from pushplan.motion.state_lattice.built_lattice import BuiltLattice
-from pushplan.motion.state_lattice.frame import Frame
+from pushplan.motion.state_lattice.built_lattice import BuiltLattice, Frame, PoseLattice
 from pushplan.motion.state_lattice.lattice_config import LatticeConfig
 from pushplan.motion.state_lattice.lattice_map import (
     LEAN,
@@ -20,7 +19,6 @@ from pushplan.motion.state_lattice.lattice_map import (
     LatticeMap,
     place_costs,
 )
-from pushplan.motion.state_lattice.pose_lattice import PoseLattice
 from pushplan.motion.state_lattice.primitive_set import PrimitiveConfig
 from pushplan.motion.state_lattice.primitives import primitives
 from pushplan.motion.state_lattice.swaths import flat_runs, swaths

@@ -11,7 +11,7 @@ import numpy as np
 
 from pushplan.core import geometry
 from pushplan.core import motion as core
-from pushplan.motion.state_lattice.frame import Frame
+from pushplan.motion.state_lattice.built_lattice import Frame
 from pushplan.motion.time_slicing import go_on, never
 from pushplan.world import Movables, StaticMap
 from pushplan.world.checks import FloatArray, IntArray
