@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pushplan.core import motion as core
-from pushplan.motion.goal_region import goal_numbers
+from pushplan.motion.collision import goal_numbers
 from pushplan.motion.state_lattice.built_lattice import BuiltLattice
 from pushplan.motion.state_lattice.lattice_config import SPACING, LatticeConfig
 from pushplan.motion.swept_path import SweptPath

@@ -12,8 +12,7 @@ from pushplan.core import planners as core
 from pushplan.interaction import InteractionModel, QuasiStatic, SweepsMany
 from pushplan.interaction.compiled_model import CompiledInteraction
 from pushplan.interaction.ice_interaction import IceInteraction
-from pushplan.motion.collision import footprint, obstacles
-from pushplan.motion.goal_region import goal_numbers
+from pushplan.motion.collision import footprint, goal_numbers, obstacles
 from pushplan.motion.keep_out import keep_out
 from pushplan.planners.mppi.control_sequence import interpolation
 from pushplan.planners.mppi.mppi_config import MppiConfig

@@ -12,8 +12,7 @@ import threading
 from collections.abc import Callable
 
 from pushplan.core import planners as core
-from pushplan.motion.collision import footprint, obstacles
-from pushplan.motion.goal_region import goal_numbers
+from pushplan.motion.collision import footprint, goal_numbers, obstacles
 from pushplan.world import NavigationGoal, RobotModel, StaticMap
 
 

@@ -13,8 +13,7 @@ from pushplan.core import search
 from pushplan.interaction import InteractionModel
 from pushplan.interaction.path_sweepers import path_sweeper
 from pushplan.motion.coarse_path import reachable
-from pushplan.motion.collision import footprint, obstacles
-from pushplan.motion.goal_region import goal_numbers
+from pushplan.motion.collision import footprint, goal_numbers, obstacles
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.room_ahead import Room, gets_away
 from pushplan.motion.speed_profile import check_turns, goal_is_outside, timed_plan, turning_radius
