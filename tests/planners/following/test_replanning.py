@@ -11,6 +11,7 @@ from conftest import make_boxes, make_robot, make_u_maze
 from pushplan.control import Progress, SimulatedExecutor
 from pushplan.interaction import QuasiStatic
 from pushplan.planners.following import rest_sweep
+from pushplan.planners.following.plan_fit import RestSweep
 from pushplan.planners.following.plan_follower import PlanFollower
 from pushplan.planners.following.replanning import (
     Reason,
@@ -19,7 +20,6 @@ from pushplan.planners.following.replanning import (
     rest_of,
     sweep_rest,
 )
-from pushplan.planners.following.rest_sweep import RestSweep
 from pushplan.planners.following.splicing import joined, passed, world_ahead
 from pushplan.world import (
     Drive,
