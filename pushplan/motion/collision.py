@@ -1,4 +1,4 @@
-"""Collision checks of a footprint: convex polygons against convex polygons."""
+"""Footprint, obstacles and goal of a robot, as the collision checks of the core read them."""
 
 from __future__ import annotations
 

@@ -14,7 +14,8 @@ from pushplan.motion.time_slicing import never
 from pushplan.world import RobotModel, World
 from pushplan.world.checks import FloatArray
 
-_STEP = 0.08  # length of a step [circumscribed radii]
+_STEP = 0.08
+"""Length of a step [circumscribed radii], and turn of one on the spot [rad]."""
 _CELL = 0.6  # sides of the boxes of poses of which one is looked at each [steps]
 _LEAST_TURN = 0.02  # the same of headings at least [rad]
 _REACH = 3.0  # distance at which the robot has got away [circumscribed radii]
@@ -24,8 +25,6 @@ _MOST_POSES_AHEAD = 5_000  # poses that are looked at, ahead; then it counts as 
 _MOST_POSES = 60_000  # the same where the robot may do all that it can
 _PIECE = 250  # poses between two looks at the stop rule: about a millisecond
 _FINER = 0.25  # steps of the second look, before a robot is said to be boxed in
-STEP = 0.08
-"""Length of a step [circumscribed radii], and turn of one on the spot [rad]."""
 _CURVATURES = (0.0, 0.5, -0.5, 1.0, -1.0)  # of the arcs [1 / circumscribed radius]
 
 
@@ -173,10 +172,10 @@ def recovery_path(world: World, margin: float) -> FloatArray | None:
     objects = [part for k in range(len(movables)) for part in movables.parts_world(k)]
     start = world.robot_pose
     walls = obstacles(world.static)
-    steps = STEP * np.array([(size, curvature) for curvature in _CURVATURES])
+    steps = _STEP * np.array([(size, curvature) for curvature in _CURVATURES])
     if world.robot.min_speed < 0.0:
         steps = np.concatenate([steps, steps * (-1.0, 1.0)])
-    steps = np.concatenate([steps, [(0.0, STEP), (0.0, -STEP)]])
+    steps = np.concatenate([steps, [(0.0, _STEP), (0.0, -_STEP)]])
     body = footprint(world.robot)
     surroundings = [walls]
     if objects:  # it pushes them only where there is no way between them

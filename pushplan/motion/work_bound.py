@@ -1,6 +1,6 @@
-"""Lower bound on the work of robot and objects together: a proof by branch and bound.
+"""Lower bounds on the work of robot and objects together.
 
-A robot whose middle passes an object's middle nearer than both inscribed discs allow has moved it
+That of a robot's goal is proven by branch and bound. A robot whose middle passes an object's middle nearer than both inscribed discs allow has moved it
 by what is missing. So each object costs a robot's path a *depth*, and the cheapest such path is
 found over intervals of the depths: an interval [lo, hi] costs mᵢ lo, and keeps the robot's middle
 out of the disc that is hi smaller. Shortest paths among discs are exact, so each box of intervals

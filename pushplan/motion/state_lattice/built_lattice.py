@@ -1,4 +1,4 @@
-"""`BuiltLattice`: a lattice among the things of one world."""
+"""A lattice among the things of one world, and its frame: origin at the robot, x to the goal."""
 
 from __future__ import annotations
 

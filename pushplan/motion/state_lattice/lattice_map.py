@@ -1,4 +1,4 @@
-"""`LatticeMap`: the cells under a lattice, with floes and obstacles put on them."""
+"""`LatticeMap`: the cells under a lattice, with floes and obstacles on them, and their costs."""
 
 from __future__ import annotations
 
@@ -18,8 +18,6 @@ from pushplan.world.checks import FloatArray, IntArray
 
 _BLOCKED_MARGIN = 0.8
 """Cells nearer to an obstacle than this are blocked [cells]: more than half their diagonal."""
-
-
 _FEW = 2  # outlines that are drawn between two looks at a stop rule
 LEAN = 0.3
 """Angle φ [rad] of the bound of a length by its parts ahead and across, a cos φ + b sin φ."""
@@ -136,7 +134,17 @@ def place_costs(
     between: tuple[int, int],  # first and last column of the map where the origin may be
     window: HullWindow,
 ) -> FloatArray:
-    """(U, V) cost [m] from each place of a lattice to a goal line, at least or about; 0 beyond."""
+    """(U, V) cost [m] from each place of a lattice to a goal line, at least or about; 0 beyond.
+
+    A path crosses every row of cells up to the line, and where its origin does so, the robot covers
+    at least a window as wide as its inscribed disc. So the cost is at least that of the best
+    sequence of such windows, one in each row, plus the length of the path that joins them. Of that
+    length only a cos φ + b sin φ counts, for a metres ahead and b across, which is never more than
+    it: rounding the crossings to cells lengthens b no further if they may be off by one cell.
+
+    That bound dodges floes as no hull can. Averaging the costs along the path over the length of
+    the hull takes this out: an estimate that is no bound, but guides a search much better.
+    """
     costs = np.empty((len(places), len(columns)))
     core.place_costs(sums, places, goal_cell, columns, between, *window, costs)
     return costs

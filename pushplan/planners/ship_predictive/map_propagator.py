@@ -1,4 +1,4 @@
-"""`MapPropagator`: an occupancy map along a path, changed by the network."""
+"""The ice along a path: single floes, or an occupancy map that the network changes."""
 
 from __future__ import annotations
 
