@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pushplan.core import motion as core
-from pushplan.motion.state_lattice.primitive_set import PrimitiveSet
+from pushplan.motion.state_lattice.primitives import PrimitiveSet
 from pushplan.world import GoalDisc, World
 from pushplan.world.checks import FloatArray, IntArray
 

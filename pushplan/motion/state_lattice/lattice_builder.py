@@ -19,8 +19,7 @@ from pushplan.motion.state_lattice.lattice_map import (
     LatticeMap,
     place_costs,
 )
-from pushplan.motion.state_lattice.primitive_set import PrimitiveConfig
-from pushplan.motion.state_lattice.primitives import primitives
+from pushplan.motion.state_lattice.primitives import PrimitiveConfig, primitives
 from pushplan.motion.state_lattice.swaths import flat_runs, swaths
 from pushplan.motion.time_slicing import go_on, never
 from pushplan.world import GoalDisc, World
