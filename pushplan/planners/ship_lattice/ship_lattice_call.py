@@ -21,8 +21,7 @@ from pushplan.motion.state_lattice.built_lattice import BuiltLattice
 from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
 from pushplan.motion.state_lattice.lattice_config import SPACING
 from pushplan.motion.state_lattice.lattice_map import FloeCosts
-from pushplan.motion.state_lattice.lattice_path import bare_path, lay_path
-from pushplan.motion.state_lattice.lattice_search import open_search, path_arcs
+from pushplan.motion.state_lattice.lattice_search import bare_path, lay_path, open_search, path_arcs
 from pushplan.motion.swept_path import SweptPath
 from pushplan.motion.time_slicing import Pace, Stopped
 from pushplan.planners.ship_lattice.ship_lattice_config import ShipLatticeConfig

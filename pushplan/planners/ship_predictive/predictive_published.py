@@ -15,8 +15,13 @@ from pushplan.interaction.occupancy import PATCH_CELLS, Patch
 from pushplan.motion.speed_profile import timed_plan, turning_radius
 from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
 from pushplan.motion.state_lattice.lattice_config import LatticeConfig
-from pushplan.motion.state_lattice.lattice_path import bare_path, lay_path, sample_arcs
-from pushplan.motion.state_lattice.lattice_search import open_search, path_arcs
+from pushplan.motion.state_lattice.lattice_search import (
+    bare_path,
+    lay_path,
+    open_search,
+    path_arcs,
+    sample_arcs,
+)
 from pushplan.motion.time_slicing import Stopped, go_on
 from pushplan.planners.ship_predictive.beam_search import SPACING
 from pushplan.planners.ship_predictive.channel_view import ChannelView, channel_view
