@@ -10,7 +10,7 @@ import numpy as np
 from pushplan.core import interaction as core
 from pushplan.interaction.network import IceNetwork
 from pushplan.interaction.occupancy import CHANNELS, PATCH_CELLS, Patch, cell_size, ice_density
-from pushplan.planners.ship_predictive.beam_node import BeamNode
+from pushplan.planners.ship_predictive.beam_search import BeamNode
 from pushplan.planners.ship_predictive.channel_view import ChannelView
 from pushplan.world.checks import FloatArray
 

@@ -16,8 +16,12 @@ from pushplan.interaction.ice_interaction import IceInteraction
 from pushplan.motion.dubins_warm_start import ARCS
 from pushplan.motion.speed_profile import along_arcs, timed_plan
 from pushplan.motion.state_lattice.lattice_search import bare_path, sample_arcs
-from pushplan.planners.ship_predictive.beam_node import BeamNode, StatePropagator
-from pushplan.planners.ship_predictive.beam_search import SPACING, BeamSearch
+from pushplan.planners.ship_predictive.beam_search import (
+    SPACING,
+    BeamNode,
+    BeamSearch,
+    StatePropagator,
+)
 from pushplan.planners.ship_predictive.channel_view import STEEPEST, ChannelView, channel_view
 from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
 from pushplan.world import Plan, PlanResult, PlanStatus
