@@ -1,4 +1,4 @@
-"""From the robot into a lattice, and from what was found there to arcs."""
+"""From the robot into a lattice, and from what was found there to the poses of a path."""
 
 from __future__ import annotations
 
