@@ -1,0 +1,6 @@
+"""Model-predictive tracking of a path."""
+
+from pushplan.control.mpc.mpc_config import MpcConfig
+from pushplan.control.mpc.tracker import MpcTracker
+
+__all__ = ["MpcConfig", "MpcTracker"]
