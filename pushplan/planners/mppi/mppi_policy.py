@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from pushplan.control import EpisodeClock, ImmediateExecutor, waiting_twist
 from pushplan.control.limits import driven_twist, ramp_twist
-from pushplan.interaction import InteractionModel
 from pushplan.planners.arguments import check_pusher
 from pushplan.planners.mppi.control_sequence import SPEED, TURN, ControlSequence
 from pushplan.planners.mppi.costs import RolloutCost, manipulation_costs, navigation_costs
@@ -147,25 +145,3 @@ def _costs(world: World, config: MppiConfig, targets: TargetChoice) -> list[Roll
     if isinstance(world.goal, GoalDisc | GoalLine):
         return navigation_costs(world, config)
     return manipulation_costs(world, config, targets.approach(world))
-
-
-def mppi(
-    config: MppiConfig | None = None,
-    interaction: InteractionModel | None = None,
-    stop: Stop | None = None,
-    costs: Sequence[RolloutCost] = (),
-) -> MppiPolicy:
-    """Model predictive path integral control: samples weighted by exp(-cost / temperature)."""
-    return MppiPolicy(Mppi(config or MppiConfig(), interaction, costs), stop)
-
-
-def cem(
-    config: MppiConfig | None = None,
-    interaction: InteractionModel | None = None,
-    stop: Stop | None = None,
-    costs: Sequence[RolloutCost] = (),
-) -> MppiPolicy:
-    """The cross-entropy method: mean and spread of the best samples, over three iterations."""
-    return mppi(
-        config or MppiConfig(update="cem", samples=64, iterations=3), interaction, stop, costs
-    )
