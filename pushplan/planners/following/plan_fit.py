@@ -1,4 +1,4 @@
-"""`PlanFit`: how well the plan that is driven fits the world as it is now."""
+"""`PlanFit`: how well the rest of the plan that is driven fits the world as it is now."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`RolloutModel`: everything that rollouts from one snapshot need."""
+"""`RolloutModel`: everything that rollouts from one snapshot need, and what they give."""
 
 from __future__ import annotations
 

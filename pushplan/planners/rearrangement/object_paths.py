@@ -1,4 +1,4 @@
-"""Paths of objects to their goal on one map, worked out once: length, course and cost."""
+"""The goal of objects for the core, and their paths to it: length, course and cost, kept for a map."""
 
 from __future__ import annotations
 
