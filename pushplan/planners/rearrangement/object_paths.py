@@ -1,4 +1,4 @@
-"""The goal of objects for the core, and their paths to it: length, course and cost, kept for a map."""
+"""Paths of objects to their goal on one map, worked out once, and that goal for the core."""
 
 from __future__ import annotations
 
