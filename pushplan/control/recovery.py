@@ -11,7 +11,7 @@ from pushplan.control.pose_follower import PoseFollower
 from pushplan.control.progress_checker import StallChecker
 from pushplan.core import geometry, motion
 from pushplan.motion.collision import footprint, obstacles
-from pushplan.motion.recovery_path import recovery_path
+from pushplan.motion.room_ahead import recovery_path
 from pushplan.world import Drive, Twist, World
 from pushplan.world.checks import FloatArray, expect, number
 

@@ -1,4 +1,4 @@
-"""Collision checks of a footprint: convex polygons against convex polygons."""
+"""Footprint, obstacles and goal of a robot, as the collision checks of the core read them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from shapely import Polygon
 
 from pushplan.core import motion as core
-from pushplan.world import RobotModel, StaticMap
+from pushplan.world import GoalDisc, NavigationGoal, RobotModel, StaticMap
 from pushplan.world.checks import FloatArray, IntArray
 from pushplan.world.outline import convex_outline, flatten, outline_boxes
 
@@ -85,3 +85,16 @@ def _packed(places: FloatArray) -> IntArray:
     size = GROUP * int(np.ceil(len(places) / (slices * GROUP)))
     rank = np.argsort(by_x)
     return np.lexsort((places[:, 1], rank // size))
+
+
+def goal_numbers(goal: NavigationGoal, inset: float) -> FloatArray:
+    """A goal as numbers, entered by ``inset`` [m] so that noise does not miss it.
+
+    Returns:
+        (5,) 0, x, y, radius, 0 for a disc; 1, x, y, n_x, n_y for a line.
+    """
+    if isinstance(goal, GoalDisc):
+        radius = max(goal.radius - inset, 0.5 * goal.radius)
+        return np.array([0.0, goal.center[0], goal.center[1], radius, 0.0])
+    point = goal.point + inset * goal.normal
+    return np.array([1.0, point[0], point[1], goal.normal[0], goal.normal[1]])

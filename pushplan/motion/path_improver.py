@@ -12,9 +12,8 @@ import numpy as np
 from pushplan.core import motion as core
 from pushplan.interaction import InteractionModel
 from pushplan.interaction.compiled_model import SweptModel, compile_interaction
-from pushplan.motion.collision import footprint, obstacles
+from pushplan.motion.collision import footprint, goal_numbers, obstacles
 from pushplan.motion.goal_approach import behind, fitting, path_end, run_up
-from pushplan.motion.goal_region import goal_numbers
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_search_config import (
     BATCH,

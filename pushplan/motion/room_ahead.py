@@ -9,11 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from pushplan.core import motion as core
+from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.time_slicing import never
-from pushplan.world import RobotModel
+from pushplan.world import RobotModel, World
 from pushplan.world.checks import FloatArray
 
-_STEP = 0.08  # length of a step [circumscribed radii]
+_STEP = 0.08
+"""Length of a step [circumscribed radii], and turn of one on the spot [rad]."""
 _CELL = 0.6  # sides of the boxes of poses of which one is looked at each [steps]
 _LEAST_TURN = 0.02  # the same of headings at least [rad]
 _REACH = 3.0  # distance at which the robot has got away [circumscribed radii]
@@ -23,6 +25,7 @@ _MOST_POSES_AHEAD = 5_000  # poses that are looked at, ahead; then it counts as 
 _MOST_POSES = 60_000  # the same where the robot may do all that it can
 _PIECE = 250  # poses between two looks at the stop rule: about a millisecond
 _FINER = 0.25  # steps of the second look, before a robot is said to be boxed in
+_CURVATURES = (0.0, 0.5, -0.5, 1.0, -1.0)  # of the arcs [1 / circumscribed radius]
 
 
 class Room(NamedTuple):
@@ -150,3 +153,39 @@ def _search(
             break
         outcome = search.run(min(upto, most))
     return outcome, search
+
+
+def recovery_path(world: World, margin: float) -> FloatArray | None:
+    """A drive (N, 3) to the nearest place with clearance to turn about.
+
+    It moves no object if it can; where objects close the way out, it pushes them along. None if
+    there is no such place within reach, or the robot is in one. What the robot touches at first it
+    may touch on the way, but no deeper: a bumper can hook on a corner. The drive keeps away from
+    all else if it can.
+
+    Args:
+        world: the snapshot.
+        margin: distance to keep from what is static if it can [m].
+    """
+    size = world.robot.circumscribed_radius
+    movables = world.movables
+    objects = [part for k in range(len(movables)) for part in movables.parts_world(k)]
+    start = world.robot_pose
+    walls = obstacles(world.static)
+    steps = _STEP * np.array([(size, curvature) for curvature in _CURVATURES])
+    if world.robot.min_speed < 0.0:
+        steps = np.concatenate([steps, steps * (-1.0, 1.0)])
+    steps = np.concatenate([steps, [(0.0, _STEP), (0.0, -_STEP)]])
+    body = footprint(world.robot)
+    surroundings = [walls]
+    if objects:  # it pushes them only where there is no way between them
+        surroundings.insert(0, obstacles(world.static, objects))
+    for among in surroundings:
+        if among.can_turn(start[0], start[1], size):
+            return None
+        for distance in dict.fromkeys((margin, 0.0)):
+            grown = footprint(world.robot, distance)
+            path = core.recovery_path(start, steps, body, grown, among, size)
+            if len(path):
+                return path
+    return None

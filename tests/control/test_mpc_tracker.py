@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from test_tracking_controllers import FLOOR, S_CURVE, arc_plan, distance_to, drive
 
 from pushplan.control import MpcConfig, MpcTracker, PathFollower
-from pushplan.control.mpc.inputs import track_of
+from pushplan.control.mpc.tracker import track_of
 from pushplan.world import Controller, InvalidInputError, Plan, Twist, World
 
 SLOW_RUDDER = make_robot(max_turn_acceleration=0.02)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from conftest import make_robot, make_u_maze
 
-from pushplan.motion.transport_bound import transport_bound
-from pushplan.motion.work_bound import work_bound
+from pushplan.motion.work_bound import transport_bound, work_bound
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.world import ClearanceArea, GoalDisc, Movables, Receptacle, StaticMap

@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 
 from pushplan.core import motion as core
 from pushplan.motion.state_lattice.lattice_builder import dubins_to_line
-from pushplan.motion.state_lattice.primitive_set import PrimitiveConfig
-from pushplan.motion.state_lattice.primitives import generate, primitives
+from pushplan.motion.state_lattice.primitives import PrimitiveConfig, generate, primitives
 from pushplan.world import InvalidInputError
 
 

@@ -5,9 +5,7 @@ import pytest
 from conftest import make_boxes, make_robot, make_u_maze, scattered_boxes
 
 from pushplan.geometry import VisibilityGraph
-from pushplan.motion.length_bound import length_bound
-from pushplan.motion.transport_bound import transport_bound
-from pushplan.motion.work_bound import work_bound
+from pushplan.motion.work_bound import length_bound, transport_bound, work_bound
 from pushplan.planners import MaxIterations, make_planner
 from pushplan.world import ClearanceArea, GoalDisc, Movables, Receptacle, StaticMap, World
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from pushplan.control.limits import driven_twist
-from pushplan.control.mpc.inputs import limits_of, track_of
 from pushplan.control.mpc.mpc_config import MpcConfig
 from pushplan.control.staged_controller import StagedController
 from pushplan.core import control as core
@@ -105,4 +104,22 @@ def _tuning(robot: RobotModel, config: MpcConfig) -> core.Tuning:
         smoothness=config.smoothness,
         terminal=config.terminal,
         speed_weight=config.speed_weight,
+    )
+
+
+def track_of(plan: Plan) -> core.ReferencePath:
+    """The path of a plan as the core reads it."""
+    return core.ReferencePath(plan.poses, plan.arc_lengths, plan.speeds)
+
+
+def limits_of(robot: RobotModel) -> core.CommandLimits:
+    """The limits of a robot as the core reads them."""
+    return core.CommandLimits(
+        robot.drive is Drive.CONSTANT_SPEED,
+        robot.min_speed,
+        robot.max_speed,
+        robot.max_turn_rate,
+        robot.max_acceleration,
+        robot.max_turn_acceleration,
+        robot.min_turning_radius,
     )

@@ -8,8 +8,7 @@ from collections.abc import Iterable, Mapping
 from pushplan.envs.making import make
 from pushplan.evaluation.statistics.gaps import total_work
 from pushplan.evaluation.statistics.stored_run import StoredRun
-from pushplan.motion.transport_bound import transport_bound
-from pushplan.motion.work_bound import work_bound
+from pushplan.motion.work_bound import transport_bound, work_bound
 from pushplan.scenarios import Scenario
 from pushplan.scenarios.known_bounds import KnownBounds
 from pushplan.world import GoalDisc, GoalLine

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -16,7 +17,6 @@ from pushplan.motion.path_improver import Candidate, PathImprover
 from pushplan.motion.path_search_config import EDGE
 from pushplan.motion.polyline_plan import polyline_plan
 from pushplan.motion.random_tree.kinodynamic_tree import TreeGrowth, TreeLimits
-from pushplan.motion.random_tree.targets import Targets
 from pushplan.motion.room_ahead import gets_away, is_boxed_in
 from pushplan.motion.speed_profile import TIGHTEST
 from pushplan.motion.start_turn import drive_to_turn, start_turn
@@ -31,6 +31,8 @@ _TREE_ITERATIONS = 1500  # of the tree that may push them
 _BACKWARD = 2.0  # greatest distance that a car may go back at first [turning radii]
 _EDGES = 30
 """Edges along a coarse path up to which a tree gets its budget; in proportion more beyond."""
+_BLOCK = 128  # targets that are drawn at once, as a draw of few takes as long
+_HEADING_SPREAD = 0.4  # standard deviation of headings about the coarse path [rad]
 
 
 class TreePaths:
@@ -174,3 +176,45 @@ class TreePaths:
         if len(corners) == 0:
             return world.robot_pose[None, :2]
         return polyline_plan(world, corners, self._improver.size).poses[:, :2]
+
+
+@dataclass(eq=False)
+class Targets:
+    """Draws the poses that a tree grows towards."""
+
+    coarse: FloatArray  # (N, 2) coarse path to the goal [m]
+    fraction: float  # of the targets that are near it; the others are uniform
+    spread: float  # standard deviation of those about it [m]
+    bounds: FloatArray  # (4,) of the workspace
+    rng: np.random.Generator
+
+    def __post_init__(self) -> None:
+        coarse = self.coarse
+        index = np.arange(len(self.coarse))
+        ahead = coarse[np.minimum(index + 3, len(coarse) - 1)]
+        behind = coarse[np.maximum(index - 3, 0)]
+        self.headings = np.arctan2(ahead[:, 1] - behind[:, 1], ahead[:, 0] - behind[:, 0])
+        self.block = np.empty((0, 3))
+        self.used = 0
+
+    def __call__(self) -> FloatArray:
+        """The next target (3,)."""
+        if self.used == len(self.block):
+            self.block = self._draw(_BLOCK)
+            self.used = 0
+        self.used += 1
+        target: FloatArray = self.block[self.used - 1]
+        return target
+
+    def _draw(self, count: int) -> FloatArray:
+        rng = self.rng
+        bounds = self.bounds
+        near = rng.random(count) < self.fraction
+        index = rng.integers(len(self.coarse), size=count)
+        offsets = rng.standard_normal((count, 3)) * [self.spread, self.spread, _HEADING_SPREAD]
+        coarsed = np.column_stack([self.coarse[index], self.headings[index]]) + offsets
+        spread = rng.random((count, 3))
+        low = [*bounds[:2], -np.pi]
+        high = [*bounds[2:], np.pi]
+        uniform = low + spread * (np.asarray(high) - low)
+        return np.where(near[:, None], coarsed, uniform)

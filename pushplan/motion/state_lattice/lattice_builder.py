@@ -10,15 +10,16 @@ from functools import cached_property
 import numpy as np
 
 from pushplan.motion.keep_out import keep_out
-from pushplan.motion.state_lattice.built_lattice import BuiltLattice
-from pushplan.motion.state_lattice.cost_map import FloeCosts
-from pushplan.motion.state_lattice.frame import Frame
+from pushplan.motion.state_lattice.built_lattice import BuiltLattice, Frame, PoseLattice
 from pushplan.motion.state_lattice.lattice_config import LatticeConfig
-from pushplan.motion.state_lattice.lattice_map import LatticeMap
-from pushplan.motion.state_lattice.place_costs import LEAN, HullWindow, place_costs
-from pushplan.motion.state_lattice.pose_lattice import PoseLattice
-from pushplan.motion.state_lattice.primitive_set import PrimitiveConfig
-from pushplan.motion.state_lattice.primitives import primitives
+from pushplan.motion.state_lattice.lattice_map import (
+    LEAN,
+    FloeCosts,
+    HullWindow,
+    LatticeMap,
+    place_costs,
+)
+from pushplan.motion.state_lattice.primitives import PrimitiveConfig, primitives
 from pushplan.motion.state_lattice.swaths import flat_runs, swaths
 from pushplan.motion.time_slicing import go_on, never
 from pushplan.world import GoalDisc, World

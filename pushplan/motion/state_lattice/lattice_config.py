@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Any, Self
 
-from pushplan.motion.state_lattice.primitive_set import PrimitiveConfig
+from pushplan.motion.state_lattice.primitives import PrimitiveConfig
 from pushplan.world.checked_fields import (
     CheckedFields,
     Limits,

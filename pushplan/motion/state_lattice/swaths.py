@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pushplan.core import motion as core
-from pushplan.motion.state_lattice.primitive_set import PrimitiveSet
+from pushplan.motion.state_lattice.primitives import PrimitiveSet
 from pushplan.motion.time_slicing import go_on, never
 from pushplan.world.checks import FloatArray, IntArray
 

@@ -4,6 +4,6 @@ from pushplan.planners.mppi.costs import RolloutCost
 from pushplan.planners.mppi.mppi import Decision, Mppi
 from pushplan.planners.mppi.mppi_config import MppiConfig
 from pushplan.planners.mppi.mppi_policy import MppiPolicy
-from pushplan.planners.mppi.rollouts import Rollouts
+from pushplan.planners.mppi.rollout_model import Rollouts
 
 __all__ = ["Decision", "Mppi", "MppiConfig", "MppiPolicy", "RolloutCost", "Rollouts"]

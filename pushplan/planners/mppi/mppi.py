@@ -17,8 +17,7 @@ from pushplan.planners.mppi.control_sequence import (
 )
 from pushplan.planners.mppi.costs import RolloutCost, total_cost
 from pushplan.planners.mppi.mppi_config import MppiConfig
-from pushplan.planners.mppi.rollout_model import RolloutModel
-from pushplan.planners.mppi.rollouts import Rollouts
+from pushplan.planners.mppi.rollout_model import RolloutModel, Rollouts
 from pushplan.planners.mppi.update_rules import updated
 from pushplan.world import Plan, PlanResult, PlanStatus, Stop, World
 from pushplan.world.checks import FloatArray, expect

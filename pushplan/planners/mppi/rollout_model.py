@@ -1,8 +1,9 @@
-"""`RolloutModel`: everything that rollouts from one snapshot need."""
+"""`RolloutModel`: everything that rollouts from one snapshot need, and what they give."""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,19 +13,44 @@ from pushplan.core import planners as core
 from pushplan.interaction import InteractionModel, QuasiStatic, SweepsMany
 from pushplan.interaction.compiled_model import CompiledInteraction
 from pushplan.interaction.ice_interaction import IceInteraction
-from pushplan.motion.collision import footprint, obstacles
-from pushplan.motion.goal_region import goal_numbers
+from pushplan.motion.collision import footprint, goal_numbers, obstacles
 from pushplan.motion.keep_out import keep_out
 from pushplan.planners.mppi.control_sequence import interpolation
 from pushplan.planners.mppi.mppi_config import MppiConfig
-from pushplan.planners.mppi.rollouts import BLOCKED, Rollouts, make_rollouts
 from pushplan.world import GoalDisc, GoalLine, World
-from pushplan.world.checks import FloatArray
+from pushplan.world.checks import FloatArray, IntArray
 
 _TURN = 0.35  # greatest turn from pose to pose [rad]
 _LENGTH = 0.3  # greatest length from pose to pose [circumscribed radii]
 _NEAR = 1.5  # objects so much farther away than the robot gets are left out [R]
 _FEW = 40  # objects that are few enough to keep them all
+DRIVEN = 0
+REACHED = 1
+BLOCKED = 2
+"""Ends of a rollout: at the horizon, in the goal, or at something static or jammed."""
+
+
+class Rollouts(NamedTuple):
+    """S rollouts of N + 1 poses among K objects."""
+
+    paths: FloatArray  # (S, N + 1, 3) poses of the robot; the last one again after the end
+    twists: FloatArray  # (S, H, 2) speed [m/s] and turn rate [rad/s] of each step
+    ends: IntArray  # (S,) index of the last pose that is reached
+    outcomes: IntArray  # (S,) `DRIVEN`, `REACHED` or `BLOCKED`
+    objects: FloatArray  # (S, K, 3) poses of the objects there
+    works: FloatArray  # (S,) sum of mass times path length of the objects [kg m]
+
+
+def make_rollouts(samples: int, steps: int, substeps: int, objects: int) -> Rollouts:
+    """Memory for rollouts."""
+    return Rollouts(
+        np.empty((samples, steps * substeps + 1, 3)),
+        np.empty((samples, steps, 2)),
+        np.zeros(samples, np.int64),
+        np.zeros(samples, np.int64),
+        np.empty((samples, objects, 3)),
+        np.zeros(samples),
+    )
 
 
 def default_model(world: World) -> InteractionModel:

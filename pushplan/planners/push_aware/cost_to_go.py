@@ -12,8 +12,7 @@ import threading
 from collections.abc import Callable
 
 from pushplan.core import planners as core
-from pushplan.motion.collision import footprint, obstacles
-from pushplan.motion.goal_region import goal_numbers
+from pushplan.motion.collision import footprint, goal_numbers, obstacles
 from pushplan.world import NavigationGoal, RobotModel, StaticMap
 
 
@@ -51,9 +50,5 @@ class CostToGoMaker:
         return table if table.useful else None
 
 
-@functools.lru_cache(maxsize=8)
-def cost_to_go_maker(
-    robot: RobotModel, static: StaticMap, goal: NavigationGoal, radius: float, inset: float
-) -> CostToGoMaker:
-    """The maker of a table, with what is done of it; cached."""
-    return CostToGoMaker(robot, static, goal, radius, inset)
+cost_to_go_maker = functools.lru_cache(maxsize=8)(CostToGoMaker)
+"""The maker of a table, with what is done of it; cached."""

@@ -10,12 +10,12 @@ from pushplan.core import planners as core
 from pushplan.core import search
 from pushplan.motion.dubins_warm_start import set_aside_drive
 from pushplan.motion.keep_out import keep_out
-from pushplan.motion.length_bound import length_bound
 from pushplan.motion.local_windows import warm_start
 from pushplan.motion.path_improver import Candidate, PathImprover
 from pushplan.motion.path_search_config import INSET, LEAST_GAIN
 from pushplan.motion.random_tree.tree_paths import TreePaths
 from pushplan.motion.start_turn import start_turn
+from pushplan.motion.work_bound import length_bound
 from pushplan.planners.push_aware.cost_to_go import cost_to_go_maker
 from pushplan.planners.push_aware.push_aware_config import PushAwareConfig
 from pushplan.world import PlanStatus

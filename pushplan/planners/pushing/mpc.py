@@ -9,7 +9,7 @@ import numpy as np
 
 from pushplan.control.episode_clock import EpisodeClock
 from pushplan.control.limits import clamp_twist, driven_twist
-from pushplan.control.mpc.inputs import limits_of, track_of
+from pushplan.control.mpc.tracker import limits_of, track_of
 from pushplan.core import control
 from pushplan.core import pushing as core
 from pushplan.geometry import gyration_squares

@@ -1,4 +1,4 @@
-"""Paths of objects to their goal on one map, worked out once: length, course and cost."""
+"""Paths of objects to their goal on one map, worked out once, and that goal for the core."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from pushplan.planners.rearrangement.rearrangement_config import SHIFTS
 from pushplan.planners.rearrangement.search_budget import SearchBudget
 from pushplan.world import ClearanceArea, Goal, Receptacle, RobotModel, StaticMap
 from pushplan.world.checks import BoolArray, FloatArray
+from pushplan.world.outline import outward_normals
 
 _INSET = 1.05  # distance of an object from the edges of a receptacle when it is done [radii]
 _MOST_KEPT = 20_000  # greatest number of lengths and paths that are kept
@@ -226,3 +227,25 @@ def _goal_shapes(goal: Goal, radius: float) -> Any:
 
 push_cost_to_go = functools.lru_cache(maxsize=16)(PushCostToGo)
 """`PushCostToGo`, kept for the maps used last."""
+
+
+@functools.lru_cache(maxsize=8)
+def make_object_goal(goal: Goal, static: StaticMap, slack: float) -> core.ObjectGoal:
+    """The goal for the core. Sides of a receptacle that lie on the bounds do not count.
+
+    Args:
+        goal: of the objects.
+        static: the map with its bounds.
+        slack: by how much an object has to be clear of the polygon's edge [m].
+    """
+    assert isinstance(goal, ClearanceArea | Receptacle)
+    polygon = goal.polygon
+    normals = outward_normals(polygon)
+    offsets = (normals * polygon).sum(axis=1)
+    corners = [[x, y] for x in static.bounds[::2] for y in static.bounds[1::2]]
+    # the sides of a receptacle that stand at the walls
+    inner = (np.array(corners) @ normals.T).max(axis=0) > offsets + 4.0 * slack
+    edges = np.column_stack([normals, offsets])[inner]
+    return core.ObjectGoal(
+        polygon, np.ascontiguousarray(edges), isinstance(goal, Receptacle), slack
+    )

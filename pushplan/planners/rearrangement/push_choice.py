@@ -14,7 +14,7 @@ import numpy as np
 
 from pushplan.core import rearrangement as core
 from pushplan.errors import InvalidInputError, short
-from pushplan.motion.recovery_path import recovery_path
+from pushplan.motion.room_ahead import recovery_path
 from pushplan.planners.rearrangement.approach import (
     ApproachTree,
     Route,

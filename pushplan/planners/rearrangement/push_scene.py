@@ -18,10 +18,10 @@ from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.keep_out import keep_out
 from pushplan.planners.arguments import check_pusher
 from pushplan.planners.rearrangement.approach_lattice import ContactGrid, contact_grid
-from pushplan.planners.rearrangement.object_goal import make_object_goal
 from pushplan.planners.rearrangement.object_paths import (
     ObjectPaths,
     PushCostToGo,
+    make_object_goal,
     object_paths,
     push_cost_to_go,
 )
@@ -134,17 +134,7 @@ class PushScene:
 
     def on_finer_lattice(self) -> PushScene:
         """The same with approaches on half the cells, that keep little distance from walls."""
-        return self._changed(
-            fine=contact_grid(
-                self.world.robot,
-                self.world.static,
-                _CELL,
-                _LEAST_MARGIN,
-                self.poses,
-                self.bodies,
-                part=0.5,
-            )
-        )
+        return self._changed(fine=self._lattice(_CELL, _LEAST_MARGIN, part=0.5))
 
     def with_objects_at(self, poses: FloatArray, cache: RolloutCache | None = None) -> PushScene:
         """The same with the objects at poses (K, 3), as far as rolling out pushes goes.
@@ -277,16 +267,16 @@ class PushScene:
     @cached_property
     def fine(self) -> ContactGrid:
         """The lattice on which the next approach is planned."""
-        world = self.world
-        return contact_grid(world.robot, world.static, _CELL, MARGIN, self.poses, self.bodies)
+        return self._lattice(_CELL, MARGIN)
 
     @cached_property
     def coarse(self) -> ContactGrid:
         """The lattice on which the cost of approaches between pushes is computed."""
+        return self._lattice(_COARSE_CELL, MARGIN)
+
+    def _lattice(self, cell: float, margin: float, part: float = 1.0) -> ContactGrid:
         world = self.world
-        return contact_grid(
-            world.robot, world.static, _COARSE_CELL, MARGIN, self.poses, self.bodies
-        )
+        return contact_grid(world.robot, world.static, cell, margin, self.poses, self.bodies, part)
 
     def route_search(self, weights: FloatArray) -> core.RouteSearch:
         """The costs of legs and turns on the way to a push.

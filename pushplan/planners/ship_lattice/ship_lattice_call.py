@@ -13,23 +13,24 @@ from pushplan.core import search
 from pushplan.interaction import InteractionModel
 from pushplan.interaction.path_sweepers import path_sweeper
 from pushplan.motion.coarse_path import reachable
-from pushplan.motion.collision import footprint, obstacles
-from pushplan.motion.goal_region import goal_numbers
+from pushplan.motion.collision import footprint, goal_numbers, obstacles
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.room_ahead import Room, gets_away
 from pushplan.motion.speed_profile import check_turns, goal_is_outside, timed_plan, turning_radius
 from pushplan.motion.state_lattice.built_lattice import BuiltLattice
 from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
 from pushplan.motion.state_lattice.lattice_config import SPACING
-from pushplan.motion.state_lattice.lattice_path import bare_path, lay_path
-from pushplan.motion.state_lattice.lattice_search import open_search, path_arcs
+from pushplan.motion.state_lattice.lattice_map import FloeCosts
+from pushplan.motion.state_lattice.lattice_search import bare_path, lay_path, open_search, path_arcs
 from pushplan.motion.swept_path import SweptPath
 from pushplan.motion.time_slicing import Pace, Stopped
-from pushplan.planners.ship_lattice.floe_costs import floe_costs
-from pushplan.planners.ship_lattice.nearby_objects import NearbyObjects
 from pushplan.planners.ship_lattice.ship_lattice_config import ShipLatticeConfig
-from pushplan.planners.ship_lattice.ship_path_improver import ShipPathImprover, ShortcutProblem
-from pushplan.world import GoalLine, Plan, PlanStatus
+from pushplan.planners.ship_lattice.ship_path_improver import (
+    NearbyObjects,
+    ShipPathImprover,
+    ShortcutProblem,
+)
+from pushplan.world import GoalLine, Plan, PlanStatus, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.planning_call import PlanningCall
 
@@ -37,6 +38,9 @@ _SPREAD = 0.6  # typical sideways displacement of a shortcut [R]
 _MOST_TURN = 2.5  # greatest turn of one of its curves [rad]
 _BATCH = 100  # nodes expanded between two looks at the stop rule
 _END_FRACTION = 0.15  # fraction of the shortcuts that move the end
+_SOFT = 0.05  # keeps the cost of a cell finite at the edge of a floe where the exponent is negative
+_DISPLACEMENT = 2.7
+"""Distance by which a floe that the hull runs over is pushed, in half beams plus floe radii."""
 
 
 class ShipLatticeCall:
@@ -240,3 +244,30 @@ class ShipLatticeCall:
             works = np.concatenate([best.works, np.repeat(best.works[-1:], missing)])
             path = SweptPath(best.poses, best.curvatures, objects, best.lengths, works)
         return timed_plan(self.world, path, self.config.turn_fraction)
+
+
+def floe_costs(
+    config: ShipLatticeConfig,  # says what a floe costs
+    world: World,
+    cell: float,  # side of a cell of the map [m]
+) -> FloeCosts:
+    """Costs of all floes of a world."""
+    floes = world.movables
+    robot = world.robot
+    half = max(robot.inscribed_radius, 0.1 * robot.circumscribed_radius)
+    areas = floes.contact_areas
+    radii = np.sqrt(areas / np.pi)
+    if config.floe_cost == "kinetic-energy":
+        ship = robot.mass
+        masses = floes.masses
+        energy = ship * masses * (masses + 2.0 * ship) / (2.0 * (ship + masses) ** 2)
+        # the published map gives this to the middle of a floe and less to its edge:
+        # the mean of 1 - d²/(r + 1/2)² over a disc of r cells
+        cells = radii / cell
+        mean = 1.0 - 0.5 * (cells / (cells + 0.5)) ** 2
+        middle = config.collision_weight * energy / (0.5 * ship) * cell / half
+        soft = float(np.mean((1.0 + 0.5 / np.maximum(cells, 0.1)) ** 2 - 1.0))
+        return FloeCosts(middle * mean * areas / cell**2, areas, config.exponent, soft)
+    pushed = _DISPLACEMENT * (half + radii)
+    weight = config.push_weight / robot.mass
+    return FloeCosts(weight * floes.masses * pushed, areas, config.exponent, _SOFT)

@@ -11,8 +11,7 @@ import numpy as np
 from pushplan.core import interaction
 from pushplan.core import planners as core
 from pushplan.interaction.ice_interaction import IceInteraction, IceSettings
-from pushplan.motion.collision import footprint, obstacles
-from pushplan.motion.goal_region import goal_numbers
+from pushplan.motion.collision import footprint, goal_numbers, obstacles
 from pushplan.motion.room_ahead import Room, is_boxed_in
 from pushplan.motion.speed_profile import check_turns
 from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig

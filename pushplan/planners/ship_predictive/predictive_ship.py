@@ -11,10 +11,9 @@ import numpy as np
 
 from pushplan.interaction.ice_interaction import IceInteraction
 from pushplan.interaction.network import IceNetwork
-from pushplan.planners.ship_predictive.beam_node import StatePropagator
+from pushplan.planners.ship_predictive.beam_search import StatePropagator
 from pushplan.planners.ship_predictive.channel_view import ChannelView
-from pushplan.planners.ship_predictive.floe_propagator import FloePropagator
-from pushplan.planners.ship_predictive.map_propagator import MapPropagator
+from pushplan.planners.ship_predictive.map_propagator import FloePropagator, MapPropagator
 from pushplan.planners.ship_predictive.predictive_call import plan_call
 from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
 from pushplan.world import PlanResult, Stop, World

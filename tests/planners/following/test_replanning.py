@@ -10,7 +10,8 @@ from conftest import make_boxes, make_robot, make_u_maze
 
 from pushplan.control import Progress, SimulatedExecutor
 from pushplan.interaction import QuasiStatic
-from pushplan.planners.following import rest_sweep
+from pushplan.planners.following import plan_fit
+from pushplan.planners.following.plan_fit import RestSweep
 from pushplan.planners.following.plan_follower import PlanFollower
 from pushplan.planners.following.replanning import (
     Reason,
@@ -19,7 +20,6 @@ from pushplan.planners.following.replanning import (
     rest_of,
     sweep_rest,
 )
-from pushplan.planners.following.rest_sweep import RestSweep
 from pushplan.planners.following.splicing import joined, passed, world_ahead
 from pushplan.world import (
     Drive,
@@ -203,10 +203,10 @@ class TestALongRest:
     @pytest.fixture(params=[10, 37, 1000])
     def look(self, request, monkeypatch):
         """Looks along a plan until the answer is complete; for parts of so many poses."""
-        monkeypatch.setattr(rest_sweep, "_WHOLE", request.param)
-        monkeypatch.setattr(rest_sweep, "_PART", request.param)
-        monkeypatch.setattr(rest_sweep, "_WALLS", 0)
-        monkeypatch.setattr(rest_sweep, "_LEAST", 5)
+        monkeypatch.setattr(plan_fit, "_WHOLE", request.param)
+        monkeypatch.setattr(plan_fit, "_PART", request.param)
+        monkeypatch.setattr(plan_fit, "_WALLS", 0)
+        monkeypatch.setattr(plan_fit, "_LEAST", 5)
 
         def until_known(world, plan):
             rest = RestSweep()
@@ -238,12 +238,12 @@ class TestALongRest:
     def test_a_command_sweeps_one_part(self, look):
         world = floor([[30.0, 0.0, 0.0]])
         *_, calls = look(world, line_plan(world))
-        assert calls == {10: 16, 37: 4, 1000: 1}[rest_sweep._PART]
+        assert calls == {10: 16, 37: 4, 1000: 1}[plan_fit._PART]
 
     def test_what_is_farther_on_waits_until_a_plan_may_be_asked_for(self, monkeypatch):
-        monkeypatch.setattr(rest_sweep, "_WALLS", 0)
-        monkeypatch.setattr(rest_sweep, "_WHOLE", 40)
-        monkeypatch.setattr(rest_sweep, "_PART", 40)
+        monkeypatch.setattr(plan_fit, "_WALLS", 0)
+        monkeypatch.setattr(plan_fit, "_WHOLE", 40)
+        monkeypatch.setattr(plan_fit, "_PART", 40)
         rest = RestSweep()
         world = floor([[30.0, 0.0, 0.0]])
         plan = line_plan(world)

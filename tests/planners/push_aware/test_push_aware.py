@@ -17,9 +17,8 @@ from pushplan.core import planners as core
 from pushplan.envs import RolloutInteraction
 from pushplan.geometry import VisibilityGraph
 from pushplan.interaction import QuasiStatic
-from pushplan.motion.collision import footprint, obstacles
-from pushplan.motion.goal_region import goal_numbers
-from pushplan.motion.length_bound import length_bound, turning_length
+from pushplan.motion.collision import footprint, goal_numbers, obstacles
+from pushplan.motion.work_bound import length_bound, turning_length
 from pushplan.planners import make_planner, make_policy, policy_names
 from pushplan.planners.push_aware import PushAware, PushAwareConfig
 from pushplan.planners.push_aware.cost_to_go import CostToGoMaker

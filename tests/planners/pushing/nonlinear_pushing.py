@@ -11,7 +11,7 @@ from typing import Any
 import casadi
 import numpy as np
 
-from pushplan.control.mpc.inputs import track_of
+from pushplan.control.mpc.tracker import track_of
 from pushplan.core import pushing as core
 from pushplan.planners.pushing.mpc import _SAFE_FRACTION, _WEIGHTS, PushingMpc, groups_of
 from pushplan.world import Plan, RobotModel, Twist, World

@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import dijkstra
 from pushplan.control import PoseFollower
 from pushplan.core import rearrangement as core
 from pushplan.gtsp import solve_gtsp
-from pushplan.motion.recovery_path import recovery_path
+from pushplan.motion.room_ahead import recovery_path
 from pushplan.planners.rearrangement import (
     PushScene,
     RearrangementConfig,

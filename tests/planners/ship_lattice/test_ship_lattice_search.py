@@ -18,10 +18,10 @@ from pushplan.interaction.path_sweepers import path_sweeper
 from pushplan.motion.speed_profile import turning_radius
 from pushplan.motion.state_lattice.built_lattice import BuiltLattice
 from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
+from pushplan.motion.state_lattice.lattice_map import HullWindow, place_costs
 from pushplan.motion.state_lattice.lattice_search import open_search
-from pushplan.motion.state_lattice.place_costs import HullWindow, place_costs
 from pushplan.planners.ship_lattice import ShipLattice, ShipLatticeConfig
-from pushplan.planners.ship_lattice.floe_costs import floe_costs
+from pushplan.planners.ship_lattice.ship_lattice_call import floe_costs
 from pushplan.world import GoalLine, World
 
 EXACT = {"heuristic": "bound", "inflation": 1.0}
