@@ -84,7 +84,7 @@ def _score(config: TrainingConfig, path: Path, options: argparse.Namespace) -> P
     from collections import Counter
 
     from pushplan.evaluation import bench
-    from pushplan.training.policies.card import write_card
+    from pushplan.training.policies.training import write_card
 
     rows = []
     for suite in config.suites if options.episodes else ():
