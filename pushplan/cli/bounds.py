@@ -13,7 +13,7 @@ def run(options: argparse.Namespace) -> int:
     from pathlib import Path
 
     from pushplan.evaluation import Results
-    from pushplan.evaluation.statistics.bounding import scenario_bound, with_solutions
+    from pushplan.evaluation.statistics.gaps import scenario_bound, with_solutions
     from pushplan.scenarios import suite
     from pushplan.scenarios.known_bounds import known_bounds, load_bounds, save_bounds
 

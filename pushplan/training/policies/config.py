@@ -11,9 +11,9 @@ from typing import Annotated, Any
 
 from pushplan.envs.registry import SIMULATORS, TASKS, default_preset
 from pushplan.files.safe_files import known_keys, read_data
-from pushplan.learned.builders import builder_from_dict, from_mapping
 from pushplan.learned.loading import shipped_files
 from pushplan.learned.outputs import OUTPUTS
+from pushplan.learned.specification import builder_from_dict, from_mapping
 from pushplan.world import InvalidInputError, SchemaError, UnknownNameError
 from pushplan.world.checked_fields import (
     CheckedFields,
