@@ -14,8 +14,7 @@ def run(options: argparse.Namespace) -> int:
     """Describe the environment of a scenario."""
     from pushplan.envs import make
     from pushplan.learned import FeatureObservation, describe
-    from pushplan.learned.sb3_policy import ALGORITHMS
-    from pushplan.learned.sb3_saving import write_beside
+    from pushplan.learned.sb3_policy import ALGORITHMS, write_beside
     from pushplan.world import InvalidInputError
     from pushplan.world.checks import choice
 

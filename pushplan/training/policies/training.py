@@ -14,7 +14,7 @@ from typing import Any
 import pushplan
 from pushplan.drawing.figure import DPI, STYLE, TEXT
 from pushplan.imports.on_demand import need
-from pushplan.learned.sb3_saving import attach
+from pushplan.learned.sb3_policy import attach
 from pushplan.training.libraries import chosen_device, hardware, parameter_count
 from pushplan.training.policies.config import IMITATING, SamOptions, TrainingConfig
 from pushplan.training.policies.environment import TrainingEnv
