@@ -8,10 +8,9 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pushplan.cli.common import duration, has_screen, say, say_without_deadline, tell
+from pushplan.cli.common import duration, has_screen, say, say_without_deadline, start_of_task, tell
 from pushplan.cli.output_files import check_directory
 from pushplan.cli.progress import progress_of
-from pushplan.cli.scenario_options import start_of_task
 
 if TYPE_CHECKING:
     from pushplan.evaluation import Experiment

@@ -8,9 +8,8 @@ import shlex
 import sys
 from typing import TYPE_CHECKING, Any
 
-from pushplan.cli.common import say
+from pushplan.cli.common import say, scenario_of
 from pushplan.cli.output_files import check_directory, check_file
-from pushplan.cli.scenario_options import scenario_of
 
 if TYPE_CHECKING:
     from pathlib import Path

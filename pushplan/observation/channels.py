@@ -136,9 +136,9 @@ def robot_distance(image: Image, view: View) -> None:
     robot sees are exact; elsewhere the error is below one pixel.
     """
     per_metre = 255.0 / math.hypot(view.rows * view.step_up, view.cols * view.step_across)
-    image[:] = _straight(
-        view.rows, view.cols, view.step_up, view.step_across, *_eye(view), per_metre
-    )
+    # column and row of the robot's origin [px] are the same in every frame
+    eye = (0.5 * view.cols, 0.5 * view.rows + view.shift / view.step_up)
+    image[:] = _straight(view.rows, view.cols, view.step_up, view.step_across, *eye, per_metre)
     static_map = view.world.static
     if not static_map.is_empty:
         fill_hidden(image, view, bend_distances(static_map, view.finest), per_metre)
@@ -186,11 +186,6 @@ def _fill_movables(image: Image, view: View, value: int) -> None:
 
 def _fill_static(image: Image, view: View) -> None:
     core.fill_parts(image, view.numbers, *view.world.static.packed, 255)
-
-
-def _eye(view: View) -> tuple[float, float]:
-    """Column and row of the robot's origin [px]: the same in every frame."""
-    return 0.5 * view.cols, 0.5 * view.rows + view.shift / view.step_up
 
 
 @functools.lru_cache(maxsize=16)
