@@ -1,4 +1,4 @@
-"""`Specification`: what a file with a network says about itself."""
+"""`Specification`: what a file with a network says about itself, observations included."""
 
 from __future__ import annotations
 

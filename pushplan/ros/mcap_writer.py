@@ -1,4 +1,4 @@
-"""`McapWriter`: worlds, plans and commands as messages of an MCAP file."""
+"""`McapLog` and its `McapWriter`: worlds, plans and commands as messages of an MCAP file."""
 
 from __future__ import annotations
 

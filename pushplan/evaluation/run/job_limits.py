@@ -1,4 +1,4 @@
-"""Limits on what one job may use: wall-clock time and memory."""
+"""Limits on what one job may use, time and memory, and (on Linux) the processes that it starts."""
 
 from __future__ import annotations
 
