@@ -7,13 +7,17 @@ import json
 import math
 import os
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pushplan.evaluation import PolicySpec
+    from pushplan.scenarios import Scenario
     from pushplan.world import Episode
+
+DRIVEN_WITH_KEYS = ("turn_rate", "velocity")
+"""Action modes that a person with keys can use."""
 
 
 def check_episode_file(path: str | None) -> None:
@@ -129,3 +133,81 @@ def duration(seconds: float) -> str:
     if minutes < 120:
         return f"{minutes} min"
     return f"{minutes / 60.0:.1f} h"
+
+
+def scenario_of(options: argparse.Namespace) -> Scenario:
+    """The scenario that was asked for, by a suite or a task; errors as `start_of_task`."""
+    from pushplan.scenarios import suite, suite_names
+    from pushplan.world import InvalidInputError
+
+    if (found := start_of_task(options)) is not None:
+        return found
+    if options.suite not in suite_names() and os.path.exists(options.suite):
+        raise InvalidInputError(
+            f"{options.suite!r} is a file or a folder, no suite: a world is given as "
+            "--task room --set world_file=FILE"
+        )
+    return suite(options.suite, episodes=1, first_seed=options.seed).scenarios[0]
+
+
+def start_of_task(options: argparse.Namespace) -> Scenario | None:
+    """The scenario of ``--task`` with its variations; None where a suite is given instead.
+
+    Raises:
+        InvalidInputError: if both are given or none, or variations with a suite.
+    """
+    from pushplan.envs.registry import default_preset
+    from pushplan.scenarios import Scenario
+    from pushplan.world import InvalidInputError
+
+    shown = {name: getattr(options, name) for name in ("boxes", "shape", "robot")}
+    chosen = {key: value for key, value in shown.items() if value is not None}
+    given = chosen | variations("variation", options.variations, chosen)
+    if (options.suite is None) == (options.task is None):
+        raise InvalidInputError("give either a SUITE or --task NAME, see --help")
+    if options.suite is None:
+        simulator = options.simulator or "pymunk"
+        preset = options.preset or default_preset(options.task, simulator)
+        return Scenario(options.task, simulator, preset, given, options.seed)
+    extra = [*given, *(name for name in ("simulator", "preset") if getattr(options, name))]
+    if extra:
+        raise InvalidInputError(
+            f"a suite says what its scenarios are: {', '.join(sorted(extra))} needs --task instead"
+        )
+    return None
+
+
+def variations(kind: str, texts: Sequence[str], chosen: Collection[str] = ()) -> dict[str, Any]:
+    """Values by name of texts of the form ``NAME=VALUE``.
+
+    Args:
+        kind: what errors call one of them.
+        texts: what was given.
+        chosen: names that have a value already.
+
+    Raises:
+        InvalidInputError: as `variation`, or if a name is given twice.
+    """
+    from pushplan.world import InvalidInputError
+
+    values: dict[str, Any] = {}
+    for name, value in map(variation, texts):
+        if name in values or name in chosen:
+            raise InvalidInputError(f"{kind} {name!r} is given twice")
+        values[name] = value
+    return values
+
+
+def variation(text: str) -> tuple[str, Any]:
+    """Name and value of a text of the form ``NAME=VALUE``.
+
+    Raises:
+        InvalidInputError: if it has another form, or the value is no YAML.
+    """
+    from pushplan.files.safe_files import parse_yaml
+    from pushplan.world import InvalidInputError
+
+    name, equals, value = text.partition("=")
+    if not equals or not name:
+        raise InvalidInputError(f"--set takes NAME=VALUE, got {text!r:.80}")
+    return name, parse_yaml(value, f"{value!r:.60} of --set {name!r:.60}")

@@ -52,22 +52,18 @@ def show(results: Results, options: argparse.Namespace, **written: Any) -> None:
         options: with the shared options "tables".
         written: as for `Results.report`.
     """
+    from pushplan.evaluation.report.tables import on_few_lines
+
     try:
         page = results.report(pairs=options.pairs, **written)
     finally:  # the tables are of use without a page, too
-        _say_tables(results, options)
+        tables = results.tables(settings=options.settings, pairs=options.pairs)
+        _print(on_few_lines(tables))
+        for line in [*_unsuccessful_lines(results), *results.remarks]:
+            say(line)
+        if len(results.titles) > 1 and not options.settings:
+            say(f"each of the {len(results.titles)} settings: --settings, and on the page")
     say(f"page:    {page}")
-
-
-def _say_tables(results: Results, options: argparse.Namespace) -> None:
-    from pushplan.evaluation.report.tables import on_few_lines
-
-    tables = results.tables(settings=options.settings, pairs=options.pairs)
-    _print(on_few_lines(tables))
-    for line in [*_unsuccessful_lines(results), *results.remarks]:
-        say(line)
-    if len(results.titles) > 1 and not options.settings:
-        say(f"each of the {len(results.titles)} settings: --settings, and on the page")
 
 
 def show_json(results: Results, options: argparse.Namespace, **written: Any) -> None:

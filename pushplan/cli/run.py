@@ -1,22 +1,28 @@
-"""``pushplan run``: one scenario, one policy."""
+"""``pushplan run``, ``teleop`` and ``serve``: one policy, or a person, at work."""
 
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
+import sys
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pushplan.cli.common import (
+    DRIVEN_WITH_KEYS,
     check_episode_file,
     milliseconds,
     save_episode,
     say,
     say_json,
+    say_scores,
     say_without_deadline,
     say_written,
+    scenario_of,
+    variations,
 )
-from pushplan.cli.scenario_options import scenario_of
+from pushplan.cli.output_files import check_file
 
 if TYPE_CHECKING:
     from pushplan.scenarios import Scenario
@@ -88,3 +94,79 @@ def _print_times(what: str, times: FloatArray, each: str = "") -> None:
     if len(times):
         typical = milliseconds(float(np.median(times)))
         say(f"  {what} median {typical}{each}, max {milliseconds(times.max())}")
+
+
+def teleop(options: argparse.Namespace) -> int:
+    """Open a window, drive, print the scores, write the episode."""
+    scenario = scenario_of(options)
+    check_file(options.out)
+    env = _environment(scenario, options.action)
+    from pushplan.cli.cockpit import drive
+    from pushplan.cli.keyboard import Keyboard
+    from pushplan.envs.window import Window
+
+    keyboard = Keyboard()
+    window = Window(f"pushplan {scenario.task}, seed {scenario.seed}", keyboard=keyboard)
+    try:
+        episode = drive(env, scenario, window, speed=options.speed)
+    finally:
+        window.close()
+        env.close()
+    if options.out:
+        episode.save(options.out)
+    say_scores(episode)
+    if options.out:
+        say(f"wrote {options.out}")
+    return 0
+
+
+def _environment(scenario: Scenario, action: str | None) -> Any:
+    from pushplan.envs import make
+    from pushplan.envs.registry import task_class
+    from pushplan.world import InvalidInputError
+
+    known = task_class(scenario.task).actions
+    usable = [name for name in known if name in DRIVEN_WITH_KEYS]
+    if not usable:
+        raise InvalidInputError(
+            f"task {scenario.task!r} cannot be driven with keys: it has none of the actions "
+            f"{', '.join(DRIVEN_WITH_KEYS)} (it has: {', '.join(known)})"
+        )
+    return make(scenario, observation="state", action=action or usable[0])
+
+
+def serve(options: argparse.Namespace) -> int:
+    """Serve until a signal comes."""
+    import logging
+    import warnings
+
+    from pushplan.evaluation.run.policy_specs import parse_policy
+    from pushplan.serving import PROTOCOL, PolicyServer, ServerLimits
+
+    spec = parse_policy(options.policy)
+    server = PolicyServer(
+        replace(spec, options=variations("option", options.options)).make,
+        options.socket,
+        allow_remote=options.allow_remote,
+        limits=ServerLimits(
+            clients=options.clients,
+            message_bytes=options.message_bytes,
+            message_s=options.message_s,
+            idle_s=options.idle_s,
+        ),
+        label=spec.label,
+    )
+    logging.basicConfig(
+        stream=sys.stderr,
+        format="%(message)s",
+        level=logging.INFO if options.verbose else logging.WARNING,
+    )
+    # of numbers in a client's world: they say nothing to whoever reads the log
+    warnings.filterwarnings("ignore", category=RuntimeWarning, module=r"pushplan\.")
+
+    def ready() -> None:
+        sys.stdout.write(f"{spec.label} is served at {server.address} ({PROTOCOL})\n")
+        sys.stdout.flush()
+
+    server.serve_forever(ready)
+    return 0

@@ -1,4 +1,4 @@
-"""``pushplan bench``, ``experiment`` and ``stress``: commands that run jobs."""
+"""``pushplan bench``, ``experiment``, ``stress`` and ``demo``: commands that run jobs."""
 
 from __future__ import annotations
 
@@ -8,15 +8,21 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pushplan.cli.common import duration, say, say_without_deadline, tell
+from pushplan.cli.common import duration, has_screen, say, say_without_deadline, start_of_task, tell
 from pushplan.cli.output_files import check_directory
 from pushplan.cli.progress import progress_of
-from pushplan.cli.scenario_options import start_of_task
 
 if TYPE_CHECKING:
     from pushplan.evaluation import Experiment
     from pushplan.evaluation.experiment import Cost
 
+SHOWN = {
+    "namo-2d-one-box": "namo",
+    "ship-ice-2d-10": "skeleton",
+    "area-clearing-2d-10-clear-small": "greedy",
+}
+"""Suite -> the policy that is shown in its first start: quick ones."""
+_MOST_WORKERS = 3
 BYTES_PER_MB = 1e6
 BYTES_PER_GB = 1e9
 
@@ -155,3 +161,38 @@ def _megabytes(size: float) -> str:
     if size >= BYTES_PER_GB:
         return f"{size / BYTES_PER_GB:.3g} GB"
     return f"{size / BYTES_PER_MB:.2g} MB"
+
+
+def demo(options: argparse.Namespace) -> int:
+    """Run the episodes, say how they ended, write the page and open it."""
+    import webbrowser
+
+    from pushplan.cli.report import exit_code
+    from pushplan.evaluation import Job, Results, parse_policy, run_batch
+    from pushplan.imports.on_demand import need
+    from pushplan.scenarios import suite
+
+    check_directory(options.out)
+    for library in ("gymnasium", "pymunk", "rich", "jinja2", "matplotlib"):
+        need(library)  # before the work, not after it
+    jobs = [
+        Job(parse_policy(policy), scenario)
+        for name, policy in SHOWN.items()
+        for scenario in suite(name, episodes=1).scenarios
+    ]
+    say(f"{len(SHOWN)} episodes:")
+    with progress_of(options.out) as progress:
+        workers = min(os.cpu_count() or 1, _MOST_WORKERS)
+        about = {"suite": "demo"}
+        run_batch(jobs, out=options.out, workers=workers, about=about, progress=progress)
+    results = Results.load(options.out)
+    page = results.report()
+    for row in results.rows:
+        how = "success" if row.success else row.reason
+        if row.interaction_work_kg_m is not None:  # a job that failed has none
+            how += f", work {row.interaction_work_kg_m:.3g} kg m"
+        say(f"  {row.policy} in {row.task}: {how}")
+    say(f"page: {page}")
+    if not options.no_open and sys.stdout.isatty() and has_screen():  # no browser in the terminal
+        webbrowser.open(page.absolute().as_uri())
+    return exit_code(results)

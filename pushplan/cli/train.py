@@ -1,4 +1,4 @@
-"""``pushplan train`` and ``pushplan dataset``: learned policies, from nothing to a model card."""
+"""``pushplan train``, ``dataset`` and ``describe``: learned policies, up to a model card."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import shlex
 import sys
 from typing import TYPE_CHECKING, Any
 
-from pushplan.cli.common import say
-from pushplan.cli.output_files import check_directory
+from pushplan.cli.common import say, scenario_of
+from pushplan.cli.output_files import check_directory, check_file
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -84,7 +84,7 @@ def _score(config: TrainingConfig, path: Path, options: argparse.Namespace) -> P
     from collections import Counter
 
     from pushplan.evaluation import bench
-    from pushplan.training.policies.card import write_card
+    from pushplan.training.policies.training import write_card
 
     rows = []
     for suite in config.suites if options.episodes else ():
@@ -179,4 +179,37 @@ def export(options: argparse.Namespace) -> int:
     if options.minari is not None:
         to_minari(folder, options.minari)
         say(f"made the Minari data set {options.minari}")
+    return 0
+
+
+def describe(options: argparse.Namespace) -> int:
+    """Describe the environment of a scenario."""
+    from pushplan import learned
+    from pushplan.envs import make
+    from pushplan.learned.sb3_policy import ALGORITHMS, write_beside
+    from pushplan.world import InvalidInputError
+    from pushplan.world.checks import choice
+
+    names = tuple(name.lower() for name in ALGORITHMS)
+    if options.algorithm is not None:
+        choice("--algorithm", options.algorithm, names)
+    if options.model is not None:
+        check_file(options.model, (".zip",))
+        if options.algorithm is None:
+            raise InvalidInputError(f"--for needs --algorithm, one of {', '.join(names)}")
+    features = options.observation == "features"
+    env = make(
+        scenario_of(options),
+        observation=learned.FeatureObservation() if features else options.observation,
+        action=options.action,
+    )
+    facts = {}
+    if options.algorithm is not None:
+        facts["algorithm"] = options.algorithm
+    specification = learned.describe(env, repeat=options.repeat, training=facts)
+    env.close()
+    if options.model is None:
+        say(json.dumps(json.loads(specification.to_json()), indent=1))
+    else:
+        say(f"wrote {write_beside(options.model, specification)}")
     return 0

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, Protocol, runtime_checkable
 
 import numpy as np
@@ -18,6 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from pushplan.core import interaction as core
 from pushplan.errors import InvalidInputError
+from pushplan.interaction.interaction_model import InteractionModel
+from pushplan.interaction.quasi_static import QuasiStatic
 from pushplan.world import Movables, World
 from pushplan.world.checked_fields import CheckedFields, PositiveFloat, Shape
 from pushplan.world.checks import ArrayRecord, FloatArray, array
@@ -31,6 +33,9 @@ PATCH_CELLS = 40
 CELLS_PER_LENGTH = 10
 """Cells along the hull: 0.2 m for the 2 m ship of the benchmark."""
 CHANNELS = ("occupancy", "footprint", "swath")
+
+ICE_FRICTION = 1.0
+"""Coulomb coefficient between hull and ice in the two-dimensional Ship-Ice."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,3 +206,30 @@ def _cover(
 ) -> None:
     parts = (poses[objects.part_owners], objects.part_vertices, objects.part_offsets)
     core.cover_objects(*parts, frame, cell, out)
+
+
+@dataclass(frozen=True)
+class InteractionOccupancy:
+    """Sweeps every passage with an interaction model and draws where the objects end up.
+
+    With `QuasiStatic` it is the analytic predictor; with a simulator's rollout it is the truth.
+
+    Args:
+        model: the interaction model.
+    """
+
+    model: InteractionModel = field(default_factory=lambda: QuasiStatic(friction=ICE_FRICTION))
+
+    def predict(self, batch: PassageBatch) -> OccupancyForecast:
+        """Sweep the passages, one after the other; needs a batch from `make_batch`."""
+        if not batch.passages:
+            raise InvalidInputError(
+                "an interaction model follows single objects: make the batch with `make_batch`"
+            )
+        after = np.empty_like(batch.patches[:, 0])
+        work = np.empty(len(batch))
+        for i, passage in enumerate(batch.passages):
+            swept = self.model.sweep(passage.world, passage.path)
+            after[i] = patch_after(batch, i, swept.object_poses[-1])
+            work[i] = swept.work
+        return OccupancyForecast(after, work)

@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from pushplan.learned.objects import ObjectPolicy
     from pushplan.learned.onnx_policy import OnnxPolicy
     from pushplan.learned.outputs import ActionSpec
-    from pushplan.learned.sb3_policy import Sb3Policy
-    from pushplan.learned.sb3_saving import save_sb3
+    from pushplan.learned.sb3_policy import Sb3Policy, save_sb3
     from pushplan.learned.specification import RobotSpec, Specification
 
 __all__ = [
@@ -48,8 +47,7 @@ __getattr__, __dir__ = lazy_names(
         "objects": "ObjectPolicy",
         "onnx_policy": "OnnxPolicy",
         "outputs": "ActionSpec",
-        "sb3_policy": "Sb3Policy",
-        "sb3_saving": "save_sb3",
+        "sb3_policy": "Sb3Policy save_sb3",
         "specification": "RobotSpec Specification",
     },
 )

@@ -6,9 +6,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
-from pushplan.learned.builders import builder_to_dict
 from pushplan.learned.outputs import MODES, ActionSpec
-from pushplan.learned.specification import RobotSpec, Specification
+from pushplan.learned.specification import RobotSpec, Specification, builder_to_dict
 from pushplan.observation import ObservationBuilder
 from pushplan.world import InvalidInputError, UnknownNameError
 

@@ -14,10 +14,11 @@ from pushplan.core import geometry
 from pushplan.core import perception as core
 from pushplan.geometry import goal_distances
 from pushplan.observation.builder import LimitedVector
+from pushplan.observation.state import goal_point
 from pushplan.world import Goal, GoalDisc, GoalLine, ObjectGoals, StaticMap, World
 from pushplan.world.checked_fields import CheckedFields, Limits, PositiveFloat
 from pushplan.world.checks import FloatArray, IntArray, expect, frozen
-from pushplan.world.outline import centroid, flatten
+from pushplan.world.outline import flatten
 
 _GUIDE = 10
 _EACH = 9
@@ -107,11 +108,7 @@ class FeatureObservation(LimitedVector, CheckedFields):
             out[4] = length / self.range
             out[7] = 1.0
         else:
-            if isinstance(goal, ObjectGoals):
-                middle = goal.poses[:, :2].mean(axis=0)
-            else:
-                middle = centroid(goal.polygon)
-            out[:4] = np.tile((middle - at) @ to_body, 2)
+            out[:4] = np.tile((goal_point(world) - at) @ to_body, 2)
         x0, y0, x1, y1 = world.static.bounds.tolist()
         gaps = (at[0] - x0, at[1] - y0, x1 - at[0], y1 - at[1])
         nearest = int(np.argmin(gaps))

@@ -6,6 +6,7 @@ import enum
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal, cast
 
 from pushplan.errors import describe, short
@@ -66,6 +67,7 @@ _NAVIGATION = "pushplan.metrics.navigation"
 _MANIPULATION = "pushplan.metrics.manipulation"
 _PUSHES = "pushplan.metrics.pushes"
 _FACTS = "pushplan.metrics.lengths"
+_ASKED_FOR = partial(Metric, role=Role.ON_REQUEST, goal="objects")
 
 _METRICS: dict[str, Metric] = {
     "success": Metric(f"{_FACTS}:success", Role.ON_REQUEST),
@@ -74,28 +76,16 @@ _METRICS: dict[str, Metric] = {
     "S_manip": Metric(f"{_MANIPULATION}:s_manip", goal="objects", if_failed=0.0, high=1.0),
     "E_manip": Metric(f"{_MANIPULATION}:e_manip", goal="objects", if_failed=0.0),
     "I_manip": Metric(f"{_MANIPULATION}:i_manip", goal="objects", high=1.0),
-    "E_nav_to_goal_point": Metric(
-        f"{_NAVIGATION}:e_nav_to_goal_point", Role.ON_REQUEST, goal="robot"
-    ),
-    "E_manip_reference": Metric(
-        f"{_MANIPULATION}:e_manip_reference", Role.ON_REQUEST, goal="objects"
-    ),
-    "I_manip_reference": Metric(
-        f"{_MANIPULATION}:i_manip_reference", Role.ON_REQUEST, goal="objects"
-    ),
-    "place_error_m": Metric(
-        f"{_MANIPULATION}:place_error", Role.ON_REQUEST, higher_is_better=False, goal="objects"
-    ),
-    "heading_error_rad": Metric(
-        f"{_MANIPULATION}:heading_error", Role.ON_REQUEST, higher_is_better=False, goal="objects"
-    ),
+    "E_nav_to_goal_point": _ASKED_FOR(f"{_NAVIGATION}:e_nav_to_goal_point", goal="robot"),
+    "E_manip_reference": _ASKED_FOR(f"{_MANIPULATION}:e_manip_reference"),
+    "I_manip_reference": _ASKED_FOR(f"{_MANIPULATION}:i_manip_reference"),
+    "place_error_m": _ASKED_FOR(f"{_MANIPULATION}:place_error", higher_is_better=False),
+    "heading_error_rad": _ASKED_FOR(f"{_MANIPULATION}:heading_error", higher_is_better=False),
     **{
-        name: Metric(f"{_PUSHES}:{name}", Role.ON_REQUEST, higher_is_better=False, goal="objects")
+        name: _ASKED_FOR(f"{_PUSHES}:{name}", higher_is_better=False)
         for name in ("pushes", "relocations", "transit_distance_m")
     },
-    "pushing_distance_m": Metric(
-        f"{_PUSHES}:pushing_distance_m", Role.ON_REQUEST, higher_is_better=None, goal="objects"
-    ),
+    "pushing_distance_m": _ASKED_FOR(f"{_PUSHES}:pushing_distance_m", higher_is_better=None),
     "made_unsolvable": Metric(
         "pushplan.metrics.closing:made_unsolvable",
         Role.ON_REQUEST,

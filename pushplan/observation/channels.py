@@ -1,20 +1,47 @@
-"""The channels of image observations, by name. A new one is a function and a line in the table."""
+"""The channels of image observations, by name: a new one is a function and a line in the table."""
 
 from __future__ import annotations
 
 import functools
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from pushplan.core import observation as core
 from pushplan.geometry import geodesic_field
 from pushplan.geometry.shadows import BendDistances, bend_distances
-from pushplan.observation.view import Image, View
-from pushplan.world import Goal, StaticMap
+from pushplan.world import Goal, StaticMap, World
 from pushplan.world.checks import FloatArray, frozen
 from pushplan.world.outline import transform
+
+Image = np.ndarray[tuple[int, int], np.dtype[np.uint8]]
+
+
+@dataclass(frozen=True)
+class View:
+    """A window on the world: where its pixels are."""
+
+    world: World  # observed scene
+    # (3,) middle of the window [m], and the direction [rad] that is up in the image; left in the
+    # image is a quarter turn counter-clockwise from it
+    pose: FloatArray
+    rows: int  # [px]
+    cols: int  # [px]
+    step_up: float  # length of a pixel up the image [m]
+    step_across: float  # length of a pixel across it [m]
+    shift: float  # distance of the middle up the image from the robot [m]
+
+    @functools.cached_property
+    def numbers(self) -> FloatArray:
+        """(7,) pose of the window, rows, columns, and the two steps, as the core reads them."""
+        return np.array([*self.pose, self.rows, self.cols, self.step_up, self.step_across])
+
+    @property
+    def finest(self) -> float:
+        """The shorter side of a pixel [m]."""
+        return min(self.step_up, self.step_across)
 
 
 def draw_ray(image: Image, x: float, y: float, dx: float, dy: float, value: int) -> None:
@@ -109,9 +136,9 @@ def robot_distance(image: Image, view: View) -> None:
     robot sees are exact; elsewhere the error is below one pixel.
     """
     per_metre = 255.0 / math.hypot(view.rows * view.step_up, view.cols * view.step_across)
-    image[:] = _straight(
-        view.rows, view.cols, view.step_up, view.step_across, *_eye(view), per_metre
-    )
+    # column and row of the robot's origin [px] are the same in every frame
+    eye = (0.5 * view.cols, 0.5 * view.rows + view.shift / view.step_up)
+    image[:] = _straight(view.rows, view.cols, view.step_up, view.step_across, *eye, per_metre)
     static_map = view.world.static
     if not static_map.is_empty:
         fill_hidden(image, view, bend_distances(static_map, view.finest), per_metre)
@@ -159,11 +186,6 @@ def _fill_movables(image: Image, view: View, value: int) -> None:
 
 def _fill_static(image: Image, view: View) -> None:
     core.fill_parts(image, view.numbers, *view.world.static.packed, 255)
-
-
-def _eye(view: View) -> tuple[float, float]:
-    """Column and row of the robot's origin [px]: the same in every frame."""
-    return 0.5 * view.cols, 0.5 * view.rows + view.shift / view.step_up
 
 
 @functools.lru_cache(maxsize=16)

@@ -9,8 +9,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pushplan.observation.channels import CHANNELS
-from pushplan.observation.view import View
+from pushplan.observation.channels import CHANNELS, View
 from pushplan.world import UnknownNameError, World
 from pushplan.world.checked_fields import CheckedFields, Each, Limits
 from pushplan.world.checks import expect

@@ -1,7 +1,7 @@
 """ROS 2: its messages, with or without ROS installed, and logs as MCAP."""
 
 from pushplan.ros.mcap_episodes import load_episode, save_episode
-from pushplan.ros.mcap_log import McapLog
+from pushplan.ros.mcap_writer import McapLog
 from pushplan.ros.message_types import MessageTypes, RclpyTypes, RosbagsTypes
 from pushplan.ros.reading import (
     frame_of,

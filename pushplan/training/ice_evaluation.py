@@ -19,12 +19,13 @@ from pushplan.interaction import QuasiStatic
 from pushplan.interaction.ice_interaction import IceInteraction
 from pushplan.interaction.network import IceNetwork
 from pushplan.interaction.occupancy import (
+    ICE_FRICTION,
+    InteractionOccupancy,
     NoMotion,
     OccupancyForecast,
     OccupancyPredictor,
     PassageBatch,
 )
-from pushplan.interaction.occupancy_models import ICE_FRICTION, InteractionOccupancy
 from pushplan.training.ice_passages import PassageConfig, voyage_passages
 from pushplan.world.checks import integer
 

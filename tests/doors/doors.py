@@ -217,7 +217,7 @@ def _read_name(path: Path) -> Any:
 
 
 def _read_variation(path: Path) -> Any:
-    from pushplan.cli.scenario_options import variation
+    from pushplan.cli.common import variation
 
     return variation("boxes=" + path.read_bytes().decode("utf-8", "surrogateescape"))
 

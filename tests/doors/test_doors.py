@@ -18,7 +18,7 @@ import pytest
 import yaml
 from doors import DOORS, check_message, feed, swapped
 
-from pushplan.cli.scenario_options import variation
+from pushplan.cli.common import variation
 from pushplan.errors import LONGEST_MESSAGE, InvalidInputError, UnknownNameError, one_line
 from pushplan.evaluation import Experiment
 from pushplan.files.safe_files import parse_json, parse_yaml, read_bytes, read_npz

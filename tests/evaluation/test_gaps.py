@@ -6,8 +6,7 @@ import pytest
 
 from pushplan.envs import make
 from pushplan.evaluation import ResultRow
-from pushplan.evaluation.statistics.bounding import scenario_bound
-from pushplan.evaluation.statistics.gaps import gaps, total_work
+from pushplan.evaluation.statistics.gaps import gaps, scenario_bound, total_work
 from pushplan.motion.work_bound import work_bound
 from pushplan.scenarios import Scenario, suite, suite_names
 from pushplan.scenarios.known_bounds import KnownBounds, known_bounds, load_bounds, save_bounds

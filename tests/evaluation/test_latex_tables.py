@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 from synthetic_rows import many_rows
 
-from pushplan.evaluation.report import latex_tables
-from pushplan.evaluation.report.latex_tables import TEXT_WIDTH, escaped, latex
+from pushplan.evaluation.report import table_formats as latex_tables
+from pushplan.evaluation.report.table_formats import TEXT_WIDTH, escaped, latex
 from pushplan.evaluation.report.tables import AGGREGATE_NOTE, GAP_NOTE, PAIR_NOTE, SCORE_NOTE, Table
 
 ODD = "a\\b~c^d_e&f%g$h#i{j}k|l<m>n±o`p''q\"--?`"

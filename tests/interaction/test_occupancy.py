@@ -11,6 +11,7 @@ from pushplan.core import interaction as core
 from pushplan.interaction.ice_interaction import IceInteraction
 from pushplan.interaction.network import IceNetwork
 from pushplan.interaction.occupancy import (
+    InteractionOccupancy,
     NoMotion,
     OccupancyForecast,
     OccupancyPredictor,
@@ -20,7 +21,6 @@ from pushplan.interaction.occupancy import (
     make_batch,
     patch_after,
 )
-from pushplan.interaction.occupancy_models import InteractionOccupancy
 from pushplan.world import GoalLine, InvalidInputError, Movables, StaticMap, World
 from pushplan.world.outline import transform
 

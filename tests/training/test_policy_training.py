@@ -15,9 +15,9 @@ import yaml
 from pushplan.cli import main
 from pushplan.envs import PushEnv
 from pushplan.learned import FeatureObservation, OnnxPolicy
-from pushplan.training.policies.card import write_card
 from pushplan.training.policies.config import (
     IMITATING,
+    OPTIONS,
     TrainingConfig,
     config_named,
     read_config,
@@ -31,8 +31,7 @@ from pushplan.training.policies.dataset import (
 )
 from pushplan.training.policies.demonstrations import action_chunks
 from pushplan.training.policies.environment import TRAINING_SEEDS, TrainingEnv
-from pushplan.training.policies.options import OPTIONS
-from pushplan.training.policies.training import train_policy
+from pushplan.training.policies.training import train_policy, write_card
 from pushplan.training.policies.training_run import CurvePoint, TrainingRun
 from pushplan.world import InvalidInputError, SchemaError, UnknownNameError
 

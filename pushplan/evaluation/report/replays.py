@@ -14,7 +14,7 @@ import numpy as np
 from pushplan.evaluation.statistics.stored_run import StoredRun
 from pushplan.evaluation.store.rows import ResultRow
 from pushplan.files.output_files import make_folder, write_atomic
-from pushplan.world import Episode, GoalDisc, GoalLine, GoalPose, Movables, SchemaError
+from pushplan.world import Episode, GoalDisc, GoalLine, GoalPose, SchemaError
 from pushplan.world.checks import FloatArray
 from pushplan.world.stored.recorded_plans import thinned
 
@@ -87,6 +87,7 @@ def _scene(episode: Episode) -> dict[str, Any]:
     """Return the static obstacles and the goal, and the outlines of what moves."""
     world = episode.world
     goal = world.goal
+    objects = world.movables
     if isinstance(goal, GoalDisc):
         shown = {"kind": "disc", "center": _flat(goal.center), "radius": goal.radius}
         if isinstance(goal, GoalPose):
@@ -102,15 +103,11 @@ def _scene(episode: Episode) -> dict[str, Any]:
         "segments": [_flat(segment) for segment in segments],
         "goal": shown,
         "robot": [_flat(part) for part in world.robot.contact_parts],
-        "objects": [_drawn(world.movables, k) for k in range(len(world.movables))],
-    }
-
-
-def _drawn(objects: Movables, k: int) -> dict[str, Any]:
-    """The polygons that are filled for an object, and the lines around them."""
-    return {
-        "parts": [_flat(part) for part in objects.parts(k)],
-        "rings": [_flat(ring) for ring in objects.rings(k)],
+        # the polygons that are filled for an object, and the lines around them
+        "objects": [
+            {name: [_flat(one) for one in getattr(objects, name)(k)] for name in ("parts", "rings")}
+            for k in range(len(objects))
+        ],
     }
 
 

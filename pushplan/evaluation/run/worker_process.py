@@ -18,9 +18,15 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from pushplan.evaluation.run.job_limits import THREAD_VARIABLES, WORKER_VARIABLE
+from pushplan.evaluation.run.job_limits import (
+    THREAD_VARIABLES,
+    WORKER_VARIABLE,
+    descendants,
+    marked,
+    memory_kb,
+    process_group,
+)
 from pushplan.evaluation.run.jobs import BatchStoppedError, JobResult
-from pushplan.evaluation.run.process_tree import descendants, marked, memory_kb, process_group
 from pushplan.evaluation.run.worker import WorkerSetup
 from pushplan.evaluation.store.rows import ResultRow, Status
 from pushplan.files.file_locks import NO_FOLLOW

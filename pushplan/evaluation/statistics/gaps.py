@@ -1,15 +1,19 @@
-"""Gaps of episodes to the best known solution of their scenario, and to its bound."""
+"""Bounds of scenarios, the best solutions known, and gaps of episodes to both."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from pushplan.evaluation.statistics.stored_run import StoredRun
 from pushplan.evaluation.statistics.summary import grouped
 from pushplan.evaluation.store.rows import ResultRow
+from pushplan.scenarios import Scenario
 from pushplan.scenarios.known_bounds import KnownBounds
+from pushplan.world import GoalDisc, GoalLine
 
 
 @dataclass(frozen=True)
@@ -63,3 +67,45 @@ def gaps(
             to = float(np.mean(to_bound))
             found.append(Gap(setting, policy, len(to_bound), to, len(to_best), mean))
     return sorted(found, key=lambda gap: gap.setting)
+
+
+def scenario_bound(scenario: Scenario, *, most_nodes: int = 400) -> KnownBounds:
+    """The proven bound of one scenario, from its start, whatever action is chosen.
+
+    Args:
+        scenario: its environment is made and reset.
+        most_nodes: of the proof, see `pushplan.motion.work_bound`.
+    """
+    # a report needs none of these
+    from pushplan.envs.making import make
+    from pushplan.motion.work_bound import transport_bound, work_bound
+
+    # the freest action: what turns on the spot is not bound by the turns of what cannot
+    env = make(scenario, observation="state", action=("velocity", "turn_rate"))
+    try:
+        env.reset(seed=scenario.seed)
+        world = env.true_world
+    finally:
+        env.close()
+    if isinstance(world.goal, GoalDisc | GoalLine):
+        bound = work_bound(world, most_nodes=most_nodes).work
+    else:
+        bound = transport_bound(world)
+    return KnownBounds(world.robot.mass, bound)
+
+
+def with_solutions(
+    bounds: Mapping[str, KnownBounds], runs: Iterable[StoredRun]
+) -> dict[str, KnownBounds]:
+    """The bounds, with the best solutions of some runs.
+
+    Args:
+        bounds: by `Scenario.key`; other scenarios of the runs are left out.
+        runs: their results.
+    """
+    found = dict(bounds)
+    for row in itertools.chain.from_iterable(run.rows for run in runs):
+        known = found.get(row.scenario)
+        if known is not None and (work := total_work(row, known)) is not None:
+            found[row.scenario] = known.better(work, row.policy)
+    return found

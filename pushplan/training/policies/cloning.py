@@ -10,12 +10,10 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from pushplan.training.policies.config import TrainingConfig
+from pushplan.training.policies.config import BcOptions, FlowOptions, TrainingConfig
 from pushplan.training.policies.demonstrations import demonstrations
 from pushplan.training.policies.environment import TrainingEnv
-from pushplan.training.policies.flow_network import FlowPolicy
-from pushplan.training.policies.networks import DirectPolicy
-from pushplan.training.policies.options import BcOptions, FlowOptions
+from pushplan.training.policies.networks import DirectPolicy, FlowPolicy
 from pushplan.training.policies.training_run import Learned, chunk_seed
 
 _LEAST_RATE = 0.01

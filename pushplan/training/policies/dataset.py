@@ -24,8 +24,7 @@ from pushplan.envs import PushEnv
 from pushplan.files.output_files import check_folder, make_folder, write_atomic
 from pushplan.files.safe_files import known_keys, read_data, read_npz
 from pushplan.imports.on_demand import need
-from pushplan.learned.builders import builder_from_dict, builder_to_dict
-from pushplan.learned.specification import RobotSpec
+from pushplan.learned.specification import RobotSpec, builder_from_dict, builder_to_dict
 from pushplan.observation import ObservationBuilder
 from pushplan.training.policies.config import TrainingConfig
 from pushplan.training.policies.environment import TRAINING_SEEDS, environments

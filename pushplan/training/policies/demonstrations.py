@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pushplan.learned.builders import builder_from_dict
+from pushplan.learned.specification import builder_from_dict
 from pushplan.training.policies.config import TrainingConfig
 from pushplan.training.policies.dataset import EpisodeData, episodes, read_metadata
 from pushplan.world import InvalidInputError

@@ -10,10 +10,9 @@ from gymnasium.spaces import Box, Discrete
 from numpy.typing import NDArray
 
 from pushplan.envs import PushEnv
-from pushplan.learned.builders import builder_from_dict
 from pushplan.learned.describing import specification_of
 from pushplan.learned.outputs import MODES, ActionSpec
-from pushplan.learned.specification import Specification
+from pushplan.learned.specification import Specification, builder_from_dict
 from pushplan.observation import ObservationBuilder
 from pushplan.training.policies.config import TrainingConfig
 from pushplan.world import InvalidInputError, World, stream

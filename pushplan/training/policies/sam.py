@@ -21,9 +21,8 @@ from pushplan.imports.on_demand import need
 from pushplan.learned.loading import learned_file, learned_names, weights_of
 from pushplan.learned.onnx_guard import inspect
 from pushplan.observation.channels import MOVABLE
-from pushplan.training.policies.config import TrainingConfig
+from pushplan.training.policies.config import SamOptions, TrainingConfig
 from pushplan.training.policies.networks import SpatialActionNetwork
-from pushplan.training.policies.options import SamOptions
 from pushplan.world import InvalidInputError
 
 _AROUND = 2  # pixels about a movable one that exploration at objects may take

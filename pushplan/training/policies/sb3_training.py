@@ -13,10 +13,9 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv
 
-from pushplan.training.policies.config import TrainingConfig
+from pushplan.training.policies.config import PpoOptions, SamOptions, TrainingConfig
 from pushplan.training.policies.environment import TrainingEnv
 from pushplan.training.policies.networks import SmallEncoder
-from pushplan.training.policies.options import PpoOptions, SamOptions
 from pushplan.training.policies.sam import SpatialActionDqn, SpatialActionPolicy
 from pushplan.training.policies.training_run import Learned, chunk_seed
 

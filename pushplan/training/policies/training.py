@@ -1,33 +1,47 @@
-"""The door: train a policy from a configuration, or go on, and export what comes out."""
+"""The door: train a policy from a configuration, export what comes out, write its card."""
 
 from __future__ import annotations
 
+import json
 import math
 import platform
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import pushplan
 from pushplan.drawing.figure import DPI, STYLE, TEXT
 from pushplan.imports.on_demand import need
-from pushplan.learned.sb3_saving import attach
+from pushplan.learned.sb3_policy import attach
 from pushplan.training.libraries import chosen_device, hardware, parameter_count
-from pushplan.training.policies.config import IMITATING, TrainingConfig
+from pushplan.training.policies.config import IMITATING, SamOptions, TrainingConfig
 from pushplan.training.policies.environment import TrainingEnv
-from pushplan.training.policies.options import SamOptions
 from pushplan.training.policies.training_run import (
     CHECKPOINT,
     CURVE,
     MODEL,
     PICTURE,
     POLICY,
+    RECORD,
     TrainingRun,
     Until,
     train,
 )
-from pushplan.world import InvalidInputError
+from pushplan.world import InvalidInputError, SchemaError
+
+ScoreRow = Mapping[str, Any]
+"""A suite's scores: ``suite``, ``episodes``, ``success`` with ``success_low`` and ``success_high``,
+``scores`` (name -> mean, low, high; of one episode the mean), ``failures`` (reason -> count)."""
+
+_WORDS = {
+    "ppo": "PPO (Stable-Baselines3)",
+    "sac": "SAC (Stable-Baselines3)",
+    "sam": "Spatial action maps, double deep Q-learning (Stable-Baselines3)",
+    "bc": "Behaviour cloning",
+    "flow": "Flow matching of chunks of a planner's actions",
+}
 
 
 def train_policy(
@@ -204,4 +218,31 @@ def _finish(
         data=[read_metadata(folder) for folder in data],
         curve=CURVE,
     )
+    return path
+
+
+def write_card(folder: str | Path, scores: Sequence[ScoreRow], path: str | Path) -> Path:
+    """Write the model card of a training.
+
+    Raises:
+        SchemaError: if the folder holds no finished training.
+        MissingDependencyError: without Jinja2, of the extra ``learn``.
+    """
+    try:
+        record = json.loads((Path(folder) / RECORD).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise SchemaError(f"{folder} holds no finished training: {error}") from error
+    cards = need("jinja2").Environment(trim_blocks=True, lstrip_blocks=True)
+    cards.filters["json"] = json.dumps
+    cards.filters["file_name"] = lambda path: Path(path).name
+    template = resources.files("pushplan.training.policies").joinpath("model_card.md")
+    text = cards.from_string(template.read_text(encoding="utf-8")).render(
+        algorithm=_WORDS[record["config"]["algorithm"]],
+        config=record["config"],
+        record=record,
+        scores=scores,
+        names=list(dict.fromkeys(name for row in scores for name in row["scores"])),
+    )
+    path = Path(path)
+    path.write_text(text + "\n", encoding="utf-8")
     return path
