@@ -128,10 +128,10 @@ class ShipIceTask(Task):
     def _read_ice(self) -> IceField | None:
         """The floes of the file, which must lie in the channel, or the water that it states."""
         path = self.variations.ice_file
+        self.may_overlap = self.variations.ice_overlaps or self.preset.overlaps
         if path is None:
             return None
         try:
-            self.may_overlap = self.variations.ice_overlaps or self.preset.overlaps
             field = load_ice(
                 path,
                 hull=self.variations.ice_hull,
