@@ -519,7 +519,7 @@ class TestDataset:
         with pytest.raises(SchemaError, match="of 4 starts are done: the command that began it"):
             read_metadata(parts)
         before = files(parts)
-        with pytest.raises(InvalidInputError, match="data set with another noise, hold: ask for"):
+        with pytest.raises(InvalidInputError, match="data set that differs in noise, hold: give"):
             export(parts, noise=0.5, hold=7)
         assert files(parts) == before
         assert export(parts) < actions  # what is there is not made again
@@ -545,7 +545,7 @@ class TestDataset:
     def test_damage_is_said(self, data, tmp_path):
         from pushplan.planners import make_policy
 
-        with pytest.raises(InvalidInputError, match="holds a data set with another policy, starts"):
+        with pytest.raises(InvalidInputError, match="a data set that differs in policy, starts"):
             record(tiny("bc"), make_policy("random"), "x", data, episodes=1, noise=0.05)
         (tmp_path / "mine").mkdir()
         (tmp_path / "mine" / "notes.txt").touch()

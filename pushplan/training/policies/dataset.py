@@ -196,8 +196,8 @@ def _counts(folder: Path, about: Mapping[str, Any]) -> dict[str, int]:
     asked = json.loads(json.dumps(about))  # as values come back from a file
     if other := [key for key in asked if there.get(key) != asked[key]]:
         raise InvalidInputError(
-            f"{folder} holds a data set with another {', '.join(other)}: ask for the same, or "
-            "choose a new folder; nothing in this one was changed"
+            f"{folder} holds a data set that differs in {', '.join(other)}: give the same values, "
+            "or choose a new folder; nothing in this one was changed"
         )
     return {key: integer(key, there.get(key), low=0) for key in _COUNTS}
 
@@ -289,7 +289,7 @@ def read_metadata(folder: str | Path) -> dict[str, Any]:
     if data.get("starts_done") != data.get("starts"):
         raise SchemaError(
             f"{folder} holds a data set of which {data.get('starts_done')} of {data.get('starts')} "
-            "starts are done: the command that began it goes on with the others"
+            "starts are done: run the command that began it again to finish it"
         )
     return data
 
