@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import logging
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -54,7 +54,7 @@ _KEYS = (
     *("robot", "control_step", "total_episodes", "total_steps", "successes", "first_seed", "noise"),
 )
 _COUNTS = ("total_episodes", "total_steps", "successes", "starts_done")
-_LATER_KEYS = ("driver", "hold", "starts", "afresh", "hindsight", "starts_done")
+_LATER_KEYS = ("driver", "hold", "sources", "starts", "afresh", "hindsight", "starts_done")
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +83,7 @@ def record(
     driver_label: str | None = None,
     afresh: bool = False,
     hindsight: int = 0,
+    sources: Sequence[str] = (),
 ) -> Path:
     """Run a policy and write what it saw and wanted.
 
@@ -111,6 +112,7 @@ def record(
         hindsight: how many more episodes are made of each one in which objects have places of
             their own, as if these had been where the objects came to be at some later step: its
             actions lead there too (Andrychowicz et al. 2017, arXiv 1707.01495). Without rewards.
+        sources: `PolicySpec.identity` of policy and driver; a call with others does not go on.
 
     Raises:
         InvalidInputError: if the folder holds something else, or a number makes no sense.
@@ -150,6 +152,7 @@ def record(
         "noise": noise,
         "hold": hold,
         "driver": driver_label,
+        "sources": [*sources],
         "starts": episodes,
         "afresh": afresh,
         "hindsight": hindsight,
