@@ -1,6 +1,6 @@
 """The command line. Nothing heavy is imported until a command needs it.
 
-`main` imports even the parser itself, so that Ctrl-C finds it in charge from the first moment.
+`main` imports the parser itself, so that it handles Ctrl-C from the start.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ __all__ = ["main"]
 
 _USER_OS_ERRORS = (FileNotFoundError, FileExistsError, PermissionError, IsADirectoryError)
 _PLAIN = {"─": "-", "\u2212": "-", "±": "+-", "≥": ">="}
-"""Signs of our tables in ASCII."""
+"""ASCII spellings of signs in our tables."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -1,4 +1,4 @@
-"""Ctrl-C where Python would lose it, such as amid an import."""
+"""Handling of Ctrl-C during imports and callbacks, where Python may lose it."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ _AGAIN_S = 0.01
 class Interrupts:
     """Raises `KeyboardInterrupt` for Ctrl-C, but waits for the end of an import.
 
-    Amid an import Python may drop the exception, and compiled modules may abort the process. A
-    second Ctrl-C does not wait. An exception that Python drops elsewhere is raised again.
+    During an import Python may drop the exception, and compiled modules may abort the process.
+    A second Ctrl-C does not wait. If Python drops the exception elsewhere, it is raised again.
     """
 
     def __init__(self) -> None:
@@ -29,7 +29,7 @@ class Interrupts:
             sys.unraisablehook = self._dropped
 
     def __exit__(self, *_: object) -> None:
-        """Let Ctrl-C end the process without a word, since all has been said."""
+        """Let a later Ctrl-C end the process silently: the command has ended."""
         if signal.getsignal(signal.SIGINT) == self._interrupt:
             signal.signal(signal.SIGINT, signal.SIG_DFL)
 

@@ -148,13 +148,14 @@ def export(options: argparse.Namespace) -> int:
     if config.task != options.task:
         raise InvalidInputError(f"{given} is for task {config.task!r}, not {options.task!r}")
     spec = parse_policy(options.policy)
-    more: dict[str, Any] = {}
+    more: dict[str, Any] = {"sources": [spec.identity]}
     if options.first_seed is not None:
         more["first_seed"] = options.first_seed
     if options.driver is not None:
         driver = parse_policy(options.driver)
         more["driver"] = driver.make()
         more["driver_label"] = driver.label
+        more["sources"].append(driver.identity)
     try:
         folder = record(
             config,

@@ -131,7 +131,7 @@ def _use_folder(folder: str) -> None:
 
 @contextlib.contextmanager
 def fresh_modules() -> Iterator[None]:
-    """Observe imports of a user's modules: all anew if one, or what they read, has been edited."""
+    """Observe imports of users' modules, after dropping all if one, or what it read, was edited."""
     if has_changed():
         forget_modules()
     with observing(kept):

@@ -20,7 +20,7 @@ Reads = dict[str, object]
 """Path of a file, or ``$`` and the name of an environment variable -> its `version`."""
 PREFIX = "pushplan_user_"
 """Beginning of the names of modules that are loaded from files."""
-_SYSTEM = ("/dev/", "/etc/", "/proc/", "/run/", "/sys/")
+_SYSTEM = ("/dev/", "/etc/", "/proc/", "/run/", "/sys/", "/usr/share/")
 _PREFIXES = {sys.prefix, sys.base_prefix}
 _PYTHON = [
     f"{one}/{name}/" for one in _PREFIXES for name in ("bin", "etc", "lib", "lib64", "share")

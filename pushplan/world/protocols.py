@@ -23,8 +23,8 @@ def _members(protocol: type) -> tuple[str, ...]:
 class _AsksTheObject(type(Protocol)):  # type: ignore[misc]
     """Checks an object for attributes as ``hasattr`` does, also those of its ``__getattr__``.
 
-    Python does so up to 3.11 only; later versions look where nothing of the object can run, and so
-    miss the abilities of a policy that passes on what another one has.
+    Python does so up to 3.11 only; later versions look attributes up statically, and so miss the
+    abilities of a policy that wraps another one.
     """
 
     def __instancecheck__(cls, instance: object) -> bool:
@@ -38,7 +38,7 @@ class _AsksTheObject(type(Protocol)):  # type: ignore[misc]
 
 
 class HasAttributes(Protocol, metaclass=_AsksTheObject):
-    """Base of the contracts that an object keeps by having their attributes."""
+    """Base of the protocols that an object satisfies by having their attributes."""
 
 
 @runtime_checkable

@@ -233,6 +233,23 @@ class TestRescore:
         again = Results.load(tmp_path / "run").measured[row.job]["mine.py:steps"]
         assert row.steps is not None and again == 2 * row.steps
 
+    @pytest.mark.parametrize("inside", [True, False], ids=["in the call", "at import"])
+    def test_ones_own_metric_is_kept_until_what_it_reads_changes(
+        self, stored: Path, tmp_path: Path, inside: bool
+    ) -> None:
+        merge(tmp_path / "run", [stored])
+        read = f"open({str(tmp_path / 'data')!r}).read()"
+        value = read if inside else "SCALE"
+        file = tmp_path / "mine.py"
+        file.write_text(f"SCALE = {read}\ndef scaled(episode):\n    return float({value})\n")
+        for scale in ("2", "3.5"):
+            (tmp_path / "data").write_text(scale)
+            for count in (4, 0):
+                done = rescore(tmp_path / "run", [f"{file}:scaled"], columns=False)
+                assert done.episodes == count
+            measured = Results.load(tmp_path / "run").measured.values()
+            assert [one["mine.py:scaled"] for one in measured] == [float(scale)] * 4
+
     def test_a_metric_that_raises_is_one_line(self, stored: Path, tmp_path: Path) -> None:
         merge(tmp_path / "run", [stored])
         file = tmp_path / "bad.py"

@@ -515,10 +515,10 @@ class TestDataset:
                 export(parts, limit)
             kept = json.loads((parts / "metadata.json").read_text())["total_episodes"]
             (parts / "data" / f"episode_{kept:05d}.npz").write_bytes(b"PK torn")
-        with pytest.raises(SchemaError, match="of 4 starts are done: the command that began it"):
+        with pytest.raises(SchemaError, match="of 4 starts are done: run the command that began"):
             read_metadata(parts)
         before = files(parts)
-        with pytest.raises(InvalidInputError, match="data set with another noise, hold: ask for"):
+        with pytest.raises(InvalidInputError, match="data set that differs in noise, hold: give"):
             export(parts, noise=0.5, hold=7)
         assert files(parts) == before
         assert export(parts) < actions  # what is there is not made again
@@ -532,6 +532,17 @@ class TestDataset:
         assert "is no data set, there is no metadata.json in it" in capsys.readouterr().err
         assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
 
+    def test_an_edited_policy_does_not_go_on(self, tmp_path, capsys):
+        file = tmp_path / "mine.py"
+        words = ["--policy", f"mine={file}:Mine", "--task", "maze", "--episodes", "1"]
+        for turn, code in ((0.0, 0), (0.1, 2)):
+            file.write_text(
+                "import numpy\nclass Mine:\n    def reset(self, world, rng):\n        pass\n"
+                f"    def act(self, world, observation):\n        return numpy.array([{turn}])\n"
+            )
+            assert main(["dataset", "export", *words, "--out", str(tmp_path / "x")]) == code
+        assert "a data set that differs in sources: give" in capsys.readouterr().err
+
     def test_ctrl_c_says_how_to_go_on(self, tmp_path, capsys, monkeypatch):
         def interrupted(*args, **options):
             raise KeyboardInterrupt
@@ -544,7 +555,7 @@ class TestDataset:
     def test_damage_is_said(self, data, tmp_path):
         from pushplan.planners import make_policy
 
-        with pytest.raises(InvalidInputError, match="holds a data set with another policy, starts"):
+        with pytest.raises(InvalidInputError, match="a data set that differs in policy, starts"):
             record(tiny("bc"), make_policy("random"), "x", data, episodes=1, noise=0.05)
         (tmp_path / "mine").mkdir()
         (tmp_path / "mine" / "notes.txt").touch()

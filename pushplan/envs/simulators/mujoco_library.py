@@ -11,7 +11,7 @@ _PACKAGES = {"egl": "libegl1 libgl1-mesa-dri", "osmesa": "libosmesa6"}
 
 
 def no_opengl(cause: object, otherwise: str = "") -> MissingDependencyError:
-    """Our error in place of one about a missing OpenGL: it names what to install or to set.
+    """Our error about a missing OpenGL: it names what to install or to set.
 
     Args:
         cause: text or error that says what is wrong with it.
@@ -24,7 +24,7 @@ def no_opengl(cause: object, otherwise: str = "") -> MissingDependencyError:
     if packages := _PACKAGES.get(kind or "egl"):
         remedies.append(f"install it (Debian: apt-get install {packages})")
     if given:
-        asked = f"by MUJOCO_GL={given}"
+        asked = f"with MUJOCO_GL={given}"
         remedies.append(f"unset MUJOCO_GL{'' if kind == 'egl' else ' or set it to egl'}")
     return MissingDependencyError(
         f"MuJoCo finds no OpenGL {asked}: {', or '.join(remedies)}{otherwise} ({cause})"

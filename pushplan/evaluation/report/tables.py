@@ -150,12 +150,12 @@ def score_tables(
 
 
 def of_runs(count: int, runs: int) -> str:
-    """A line of a cell with the number of runs behind it, where it is not the usual one."""
+    """A line of a cell with the number of runs behind it, if that is not the usual one."""
     return "" if count == runs else f"\nn = {count}"
 
 
 def _noted(table: Table) -> Table:
-    """The table, with `RUNS_NOTE` if runs failed or a cell says how many it is from."""
+    """The table, with `RUNS_NOTE` if runs failed or a cell has a number of runs of its own."""
     if any(_FEWER.search(cell) for row in table.cells for cell in row):
         table = replace(table, note=f"{table.note}; {RUNS_NOTE}")
     return table

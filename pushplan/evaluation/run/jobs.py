@@ -19,7 +19,7 @@ from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, OneOf
 
 DEFAULT_ENV = "pushplan.envs:make"
 MOST_READS = 1000
-"""So many files and environment variables of those that a job has read first are noted."""
+"""Most files and environment variables that are noted for a job: the first that it reads."""
 DETAIL_HALF = 10_000  # characters of a traceback that are kept at its beginning and at its end
 
 

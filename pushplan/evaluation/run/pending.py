@@ -72,7 +72,7 @@ def pending_jobs(jobs: Sequence[Job], store: RunDirectory, any_version: bool) ->
             len(changed),
             len(jobs),
             store.path,
-            next(filter(None, said), "of what other episodes of the policy have read"),
+            next(filter(None, said), "in what other episodes of the policy have read"),
             DATABASE,
         )
     return pending
@@ -100,11 +100,11 @@ def sorted_out(
 
 
 def _with_data(jobs: Sequence[Job], stored: Sequence[StoredResult]) -> list[Job]:
-    """The jobs with the ``data`` of those results of theirs that still hold.
+    """Add the ``data`` of stored results that are still valid to the jobs.
 
-    If none do, it is what their code has read before, as it is now. Code of a user may read
-    something once and use it in later episodes: results with the same code and ``data`` hold
-    together, or none of them does.
+    If none are, it is what their code has read before, as it is now. Code of a user may read
+    something once and use it in later episodes: results with the same code and ``data`` are
+    valid together, or none of them is.
     """
     first = {job.policy.label: job for job in jobs}
     groups: dict[str, dict[str, dict[str, str]]] = {}  # code of users -> data -> what was read
@@ -134,7 +134,7 @@ def _with_data(jobs: Sequence[Job], stored: Sequence[StoredResult]) -> list[Job]
 
 
 def _users_code(job: Job, spec: Mapping[str, Any]) -> str:
-    """Text that is the same for jobs in which the same code of users runs."""
+    """A key that is the same for jobs that run the same code of users."""
     if job.policy.group:
         return str(job.policy.source)
     files = spec.get("files", {}).items()

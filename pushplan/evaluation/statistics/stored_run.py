@@ -61,7 +61,7 @@ class StoredRun:
 
     @property
     def remarks(self) -> list[str]:
-        """Lines about results that are not among the rows: those to come, and other ones."""
+        """Lines about results that are not among the rows: of pending jobs and other calls."""
         lines = []
         jobs = self.about.get("jobs")
         if isinstance(jobs, int) and jobs > len(self.rows):

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from pushplan.evaluation.store.provenance import package_digest
 from pushplan.evaluation.store.rows import scored_row
 from pushplan.evaluation.store.run_directory import RunDirectory, remove_report
-from pushplan.evaluation.store.source_digests import source_digest
+from pushplan.evaluation.store.source_digests import counted, read_digests, source_digest
+from pushplan.imports.observed_reads import Reads, kept, observing
 from pushplan.metrics import compute, metric_function
 from pushplan.world import Episode, SchemaError
 
@@ -35,8 +36,8 @@ def rescore(path: str | Path, metrics: Sequence[str] = (), *, columns: bool = Tr
     Args:
         path: run directory.
         metrics: further ones, kept beside the rows: names of `pushplan.metrics`, or functions as
-            ``"module:function"`` or ``"file.py:function"``. One that is there already and whose
-            file has not changed is not computed again.
+            ``"module:function"`` or ``"file.py:function"``. One that is there already is computed
+            again if its file, or what it has read, has changed.
         columns: compute the columns again, too.
 
     Raises:
@@ -53,8 +54,8 @@ def rescore(path: str | Path, metrics: Sequence[str] = (), *, columns: bool = Tr
     scored = 0
     with RunDirectory(path, new=False) as store:
         for stored in store.results():
-            known = {metric: source for metric, source, _ in stored.measured}
-            missing = [label for label in wanted if known.get(label) != sources[label]]
+            known = {metric: str(source) for metric, source, _ in stored.measured}
+            missing = [one for one in wanted if not _holds(known.get(one, ""), sources[one])]
             row = stored.row
             if row.trace_file is None or row.failed or not (columns or missing):
                 continue
@@ -70,13 +71,28 @@ def rescore(path: str | Path, metrics: Sequence[str] = (), *, columns: bool = Tr
             if new != row:
                 changed.append(row.job)
                 store.add(new, spec=stored.spec, show=stored.current)
-            values = compute(episode, [wanted[label] for label in missing])
+            reads: Reads = {}
+            with observing(reads):
+                values = compute(episode, [wanted[label] for label in missing])
+            names = {*kept, *reads} - counted
             store.measure(
-                (row.job, label, sources[label], values.get(wanted[label])) for label in missing
+                (row.job, label, _with_reads(sources[label], names), values.get(wanted[label]))
+                for label in missing
             )
         store.note("metrics", list({**dict.fromkeys(store.about().get("metrics", [])), **wanted}))
         store.write_csv()
     return Rescored(scored, tuple(changed), tuple(unreadable))
+
+
+def _with_reads(source: str, names: Iterable[str]) -> str:
+    """The version of a metric, and below it a hash and the name of each thing that it has read."""
+    read = read_digests(names, "").items()
+    return "\n".join([source, *(f"{digest} {name}" for name, digest in read)])
+
+
+def _holds(stored: str, source: str) -> bool:
+    names = [line.partition(" ")[2] for line in stored.split("\n")[1:]]
+    return stored == _with_reads(source, names)
 
 
 def metric_label(metric: str) -> str:

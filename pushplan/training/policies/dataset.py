@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import logging
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -53,7 +53,7 @@ _KEYS = (
     *("robot", "control_step", "total_episodes", "total_steps", "successes", "first_seed", "noise"),
 )
 _COUNTS = ("total_episodes", "total_steps", "successes", "starts_done")
-_LATER_KEYS = ("driver", "hold", "starts", "afresh", "hindsight", "starts_done")
+_LATER_KEYS = ("driver", "hold", "sources", "starts", "afresh", "hindsight", "starts_done")
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +82,7 @@ def record(
     driver_label: str | None = None,
     afresh: bool = False,
     hindsight: int = 0,
+    sources: Sequence[str] = (),
 ) -> Path:
     """Run a policy and write what it saw and wanted.
 
@@ -110,6 +111,7 @@ def record(
         hindsight: how many more episodes are made of each one in which objects have places of
             their own, as if these had been where the objects came to be at some later step: its
             actions lead there too (Andrychowicz et al. 2017, arXiv 1707.01495). Without rewards.
+        sources: `PolicySpec.identity` of policy and driver; a call with others does not go on.
 
     Raises:
         InvalidInputError: if the folder holds something else, or a number makes no sense.
@@ -149,6 +151,7 @@ def record(
         "noise": noise,
         "hold": hold,
         "driver": driver_label,
+        "sources": [*sources],
         "starts": episodes,
         "afresh": afresh,
         "hindsight": hindsight,
@@ -195,8 +198,8 @@ def _counts(folder: Path, about: Mapping[str, Any]) -> dict[str, int]:
     asked = json.loads(json.dumps(about))  # as values come back from a file
     if other := [key for key in asked if there.get(key) != asked[key]]:
         raise InvalidInputError(
-            f"{folder} holds a data set with another {', '.join(other)}: ask for the same, or "
-            "choose a new folder; nothing in this one was changed"
+            f"{folder} holds a data set that differs in {', '.join(other)}: give the same values, "
+            "or choose a new folder; nothing in this one was changed"
         )
     return {key: integer(key, there.get(key), low=0) for key in _COUNTS}
 
@@ -288,7 +291,7 @@ def read_metadata(folder: str | Path) -> dict[str, Any]:
     if data.get("starts_done") != data.get("starts"):
         raise SchemaError(
             f"{folder} holds a data set of which {data.get('starts_done')} of {data.get('starts')} "
-            "starts are done: the command that began it goes on with the others"
+            "starts are done: run the command that began it again to finish it"
         )
     return data
 
