@@ -198,12 +198,10 @@ def describe(options: argparse.Namespace) -> int:
         check_file(options.model, (".zip",))
         if options.algorithm is None:
             raise InvalidInputError(f"--for needs --algorithm, one of {', '.join(names)}")
-    features = options.observation == "features"
-    env = make(
-        scenario_of(options),
-        observation=learned.FeatureObservation() if features else options.observation,
-        action=options.action,
-    )
+    observation = options.observation
+    if observation == "features":
+        observation = learned.FeatureObservation()
+    env = make(scenario_of(options), observation=observation, action=options.action)
     facts = {}
     if options.algorithm is not None:
         facts["algorithm"] = options.algorithm
