@@ -18,12 +18,7 @@ from pushplan.planners.ship_predictive.beam_node import BeamNode, StatePropagato
 from pushplan.planners.ship_predictive.beam_search import BeamSearch
 from pushplan.planners.ship_predictive.channel_view import ChannelView, channel_view
 from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
-from pushplan.planners.ship_predictive.turning import (
-    in_table,
-    tight_turn,
-    turned_start,
-    way_round,
-)
+from pushplan.planners.ship_predictive.turning import in_table, tight_turn, turned_start, way_round
 from pushplan.world import Plan, PlanResult, PlanStatus
 from pushplan.world.checks import FloatArray
 from pushplan.world.planning_call import PlanningCall
