@@ -94,7 +94,11 @@ class PoseProgressChecker(ProgressChecker[FloatArray]):
 
     def _has_moved(self, before: FloatArray, pose: FloatArray) -> bool:
         turn = math.remainder(float(pose[2] - before[2]), math.tau)
-        return math.dist(pose[:2], before[:2]) >= self._distance or abs(turn) >= self._turn
+        return self.moved_by(math.dist(pose[:2], before[:2]), abs(turn)) >= 1.0
+
+    def moved_by(self, distance: float, turn: float) -> float:
+        """Size of a motion [m] and [rad], at least 1 if it counts as getting on."""
+        return max(distance / self._distance, turn / self._turn)
 
 
 class StallChecker:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 from collections.abc import Iterable
 from pathlib import Path
@@ -78,13 +79,14 @@ def _write_mp4(path: Path, first: Frame, rest: Iterable[Frame], fps: float) -> N
     height, width = first.shape[:2]
     # players want even sides and this pixel format, which is the default
     output = ["-crf", "20", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2"]
+    path.open("wb").close()  # raises a plain error, which ffmpeg would print
     film = need("imageio_ffmpeg").write_frames(
         str(path), (width, height), fps=fps, quality=None, macro_block_size=1, output_params=output
     )
-    film.send(None)
-    for frame in itertools.chain([first], rest):
-        film.send(np.ascontiguousarray(frame))
-    film.close()
+    with contextlib.closing(film):
+        film.send(None)
+        for frame in itertools.chain([first], rest):
+            film.send(np.ascontiguousarray(frame))
 
 
 def _checked(path: str | Path, endings: tuple[str, ...]) -> Path:

@@ -12,12 +12,12 @@ from pushplan.geometry.object_ways import blocked_places
 from pushplan.world import World
 
 _LEAN = 0.02
-"""Overlap that is none, as a fraction of an object's radius: it may lean on what is beside it."""
+"""Overlap that is ignored, as a fraction of the object's radius: touching bodies overlap a bit."""
 _NAMED = 3  # of the deepest overlaps are named
 
 
 class StartWarning(UserWarning):
-    """A start can be simulated, but not all of it makes sense."""
+    """A start can be simulated, but has overlaps, or places that nothing can reach."""
 
 
 def check_start(world: World, *, overlaps: bool = False) -> None:

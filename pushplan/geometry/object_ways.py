@@ -54,7 +54,7 @@ def shared_ways(
 
 
 def blocked_places(world: World) -> dict[int, float]:
-    """By id, how deep the place of an object is in something static [m], if that keeps it out.
+    """Depth of blocked places inside static obstacles [m], by the id of the object.
 
     Objects that fit somewhere within the tolerances of their places are left out, and all of them
     where the goal is not one of `ObjectGoals`.

@@ -58,8 +58,8 @@ def along_guide(improver: PathImprover, *, around: bool = False) -> bool:
 def set_aside_drive(improver: PathImprover) -> None:
     """Set aside a drive along the shortest path through all objects, for want of another plan.
 
-    The contact solver gets so many rounds that what it leaves of an overlap is held by a wall: in a
-    crowd, or where objects overlap at the start, its usual rounds end before they are apart.
+    The contact solver runs so long that only a wall can hold an overlap that it leaves: in a crowd,
+    or where objects overlap at the start, its usual rounds end before they are apart.
     """
     model = improver.interaction
     if isinstance(model, QuasiStatic):

@@ -14,8 +14,8 @@ from pushplan.motion.keep_out import keep_out
 from pushplan.world import GoalPose, RobotModel, World
 from pushplan.world.checks import FloatArray
 
-_MOST_BOXES = 500  # of poses at a goal that are looked at
-_WITHIN = 0.9  # of the tolerances is used
+_MOST_BOXES = 500  # boxes of poses that are checked at most
+_WITHIN = 0.9  # part of the tolerances that is used
 
 
 class PathEnd(NamedTuple):

@@ -279,10 +279,10 @@ class PathImprover:
             corners[-1] = self.pose_goal.center
             turn = self.pose_goal.heading_error(float(start[2]))
         along = arc_lengths(corners)
-        count = math.ceil(along[-1] / self.room.spacing + abs(turn) / core.step_along(np.inf, 1.0))
-        if count == 0:
-            return False
         length = float(along[-1])
+        if length == 0.0:
+            return False
+        count = math.ceil(length / self.room.spacing + abs(turn) / core.step_along(np.inf, 1.0))
         for kept in (0.0, min(_SLOT * self.size, _LONGEST_SLOT * length)):
             at = np.union1d(np.linspace(0.0, length, count + 1), [*along, kept, length - kept])
             x, y = (np.interp(at, along, column) for column in corners.T)

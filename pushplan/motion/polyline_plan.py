@@ -55,7 +55,7 @@ def polyline_plan(world: World, points: FloatArray, spacing: float) -> Plan:
 
 
 def polyline_status(world: World, plan: Plan) -> PlanStatus:
-    """Say of a plan as it stands whether the robot can drive it, and whether it arrives.
+    """Classify a plan: can the robot drive it, and does it reach the goal?
 
     Returns:
         `PATH_ONLY` unless the plan begins at the robot's pose, turns no faster than the robot, and

@@ -172,7 +172,7 @@ class ObjectTracker:
             else:
                 self._doubt(rest)
             self._seen_at = stamp
-        # in the order of `movables`, to whose end an object comes back
+        # in the order of `movables`; an object that returns is appended
         self._tracks.sort(key=lambda one: one.label not in self._shown)
         self._present = [one for one in self._tracks if stamp - one.seen_at <= self.keep]
         self.movables = self._collected()

@@ -51,8 +51,8 @@ _RETRY = 0.25  # time after a failure in which the policy is not asked [s]
 _BLIND = 60.0  # for how long a robot that is to continue does so without a world [s]
 _SURE = 5  # snapshots in which the goal has to be reached where one of them may err
 _STUCK = 4.5  # time after which a robot that has not moved is stuck, so that it says so in 5 s [s]
-_TOLD = 0.1  # speed from which on it was told to move [circumscribed radii/s]
-_LULL = 1.0  # pause between commands to move that counts as one of them [s]
+_TOLD = 1.8  # times the least motion that noise does not hide, to be driven in that time
+_LULL = 1.0  # longest pause between commands to move that counts as moving [s]
 _WAITING = 99  # snapshots that are kept for the next command, besides the newest
 
 
@@ -402,11 +402,13 @@ class Runner:
 
     def _idle(self, seen: World, twist: Twist, now: float, held: float) -> float:
         """For how long the robot was told to move, and did not [s]."""
-        size = seen.robot.circumscribed_radius
-        if abs(twist.course[0]) + size * abs(twist.angular) >= _TOLD * size:
+        moves = self._progress.moved_by(abs(twist.course[0]) * _STUCK, abs(twist.angular) * _STUCK)
+        part = moves / _TOLD
+        if part >= 1.0:
             self._told_at = now
         if now - self._told_at <= _LULL:
-            self._told += held
+            part = 1.0
+        self._told += part * held  # slow commands take longer to show
         self._progress.update(seen.robot_pose, self._told)
         return self._progress.idle
 

@@ -333,6 +333,14 @@ def test_gif_has_all_frames_in_their_colours(tmp_path: Path) -> None:
     assert np.abs(shown - pictures[-1]).max(axis=2).max() < 110
 
 
+@pytest.mark.parametrize("name", ["a.mp4", "a.gif"])
+def test_a_film_that_cannot_be_written_is_said_in_a_line(name: str, tmp_path: Path, capfd) -> None:
+    (tmp_path / name).mkdir()
+    with pytest.raises(InvalidInputError, match=r"^cannot write .*Is a directory[^\n]{,200}$"):
+        save_animation(tmp_path / name, [draw_world(scene(), size_px=SIZE)] * 2)
+    assert capfd.readouterr() == ("", "")
+
+
 def test_mp4_can_be_read_back(tmp_path: Path) -> None:
     pictures = frames()
     save_animation(tmp_path / "a.mp4", (p for p in pictures), fps=10)

@@ -14,6 +14,7 @@ from pushplan.core import motion as core
 from pushplan.motion.collision import footprint, obstacles
 from pushplan.planners import make_planner, make_policy
 from pushplan.world import (
+    Drive,
     GoalPose,
     InvalidInputError,
     MaxIterations,
@@ -122,6 +123,23 @@ def test_a_pose_in_a_wall_cannot_be_reached(planner):
     wall = np.array([[5.9, 6.22], [6.1, 6.22], [6.1, 6.4], [5.9, 6.4]])
     assert plan(room(0.0, walls=[wall]), planner)[0] is PlanStatus.SOLVED
     assert plan(room(1.5, walls=[wall]), planner)[0] is PlanStatus.GOAL_UNREACHABLE
+
+
+@pytest.mark.parametrize("planner", ["kinodynamic-rrt", "push-aware"])
+def test_a_robot_at_its_place_has_no_plan_that_begins_at_another_heading(planner):
+    tractor = RobotModel.from_outline(
+        0.5 * SQUARE + [0.6, 0.0],
+        mass=1.0,
+        max_speed=0.15,
+        max_turn_rate=0.5,
+        drive=Drive.OMNIDIRECTIONAL,
+    )
+    goal = GoalPose([4.0, 7.98], 0.3, -1.7, 0.02)
+    world = room(0.0, robot=tractor, robot_pose=[4.0, 7.98, 0.2], goal=goal)
+    status, found = plan(world, planner)
+    assert (found is None) is not status.has_plan
+    if found is not None:
+        check_plan(world, found, status)
 
 
 @pytest.mark.parametrize("drive", DRIVES)

@@ -171,10 +171,11 @@ def test_a_robot_that_is_held_says_that_it_is_stuck(
     assert driven.commands[-1].status is not CommandStatus.STUCK
 
 
-def test_a_robot_that_stands_as_told_or_creeps_as_told_is_not_stuck() -> None:
+@pytest.mark.parametrize("noise", [0.0, 0.1])
+def test_a_robot_that_stands_as_told_or_creeps_as_told_is_not_stuck(noise: float) -> None:
     for speed in (0.0, 0.01, 0.1):
         policy = Ahead()
         policy.speed = speed
-        driven = DrivenRobot(policy, hall(0))
+        driven = DrivenRobot(policy, hall(0), noise=noise)
         driven.drive(240)
         assert CommandStatus.STUCK not in {command.status for command in driven.commands}

@@ -101,7 +101,7 @@ class PymunkBodies:
         return int(self._lib.cpSpaceGetShapeIDCounter(self.space._space))
 
     def go_on_from(self, came: int, most: int) -> None:
-        """Solve contacts in the order of a space into which so many shapes came, ``most`` at once.
+        """Restore the order of contacts after ``came`` shapes were added, at most ``most`` at once.
 
         The engine numbers shapes as they come, and lists them by number in a table that grows.
         """

@@ -10,12 +10,7 @@ import numpy as np
 import shapely
 
 from pushplan.envs.tasks.base import StepOutcome, Task
-from pushplan.envs.tasks.layout import (
-    GAP,
-    FreeSpace,
-    footprint_at,
-    place_boxes,
-)
+from pushplan.envs.tasks.layout import GAP, FreeSpace, footprint_at, place_boxes
 from pushplan.envs.tasks.presets import Preset, read_presets
 from pushplan.envs.tasks.variations import Objects, TaskVariations, Yaw
 from pushplan.geometry.distance_field import GeodesicField, geodesic_field

@@ -43,6 +43,7 @@ from pushplan.world import (
 _PERIOD = 0.1  # for which the first command is taken to be held [s]
 _AT_ONCE = 3  # calls without a plan at one place, after which a jam waits too
 _CLOSED = (PlanStatus.GOAL_UNREACHABLE, PlanStatus.WAY_CLOSED)
+_DETOUR = 2.0  # times the length of a tight plan that the one in its place may have
 _PAUSE = 0.1  # between two plans, of the time for which the robot has not got on
 
 
@@ -218,9 +219,7 @@ class PlanFollower:
         start, stretch = world_ahead(world, plan, now, latency, self.interaction, off_plan=off)
         self._planned = world
         comparison = None
-        # from a tight curve into a pose a new plan may have to come round again
-        curves = reason is Reason.TIGHT and isinstance(world.goal, GoalPose)
-        if plan is not None and (curves or not reason.urgent):
+        if plan is not None and not reason.urgent:
             weight = self.replanning.weight(self.planner)
             comparison = self._fit.comparison(world, plan, self.interaction, weight)
         planning = PlanRequest(self.planner, start, stretch, self._rng, comparison)
@@ -246,6 +245,10 @@ class PlanFollower:
         self._fruitless.clear()
         old = self.current_plan
         kept = answer.kept
+        # from a tight curve into a pose a new plan may have to come round again
+        leaves = pending.reason is Reason.TIGHT and not isinstance(world.goal, GoalPose)
+        if leaves and kept is not None and answer.plan.length <= _DETOUR * kept.length:
+            kept = None
         if kept is not None and old is not None and self._fit.free_length(world, old) == math.inf:
             self.current_plan = pending.from_now_on(kept, world)
             return

@@ -36,7 +36,7 @@ class Reason(enum.Enum):
     @property
     def urgent(self) -> bool:
         """True where the old plan cannot be driven on."""
-        return self not in (Reason.OBJECTS, Reason.SURPRISE, Reason.PERIOD)
+        return self not in (Reason.OBJECTS, Reason.TIGHT, Reason.SURPRISE, Reason.PERIOD)
 
 
 _Endless = Annotated[float, Limits(0.0, open_low=True, finite=False)]

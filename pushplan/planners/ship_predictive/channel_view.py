@@ -64,7 +64,7 @@ class ChannelView:
         return None
 
     def without_path(self, call: PlanningCall) -> PlanStatus:
-        """The status of a call that has found no path, which does not prove that there is none."""
+        """The status of a call that found no path; it proves nothing."""
         robot = self.world.robot
         goal = goal_numbers(self.world.navigation_goal, 0.0)
         room = Room(footprint(robot), obstacles(self.world.static), goal, 0.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -430,9 +431,26 @@ def test_only_the_last_plan_of_the_log_keeps_its_predictions():
     assert policy.current_plan.object_poses is not None
 
 
+@pytest.mark.parametrize(("aside", "is_kept"), [(6.0, False), (14.0, True)])
+def test_a_tight_plan_is_not_replaced_by_one_that_is_far_longer(aside, is_kept):
+    class Tight(Scripted):
+        def plan(self, world, **options):
+            found = super().plan(world, **options)
+            return replace(found, stats=PlanStats(0.0, detail={"tight": 1.0}))
+
+    policy = follower(Tight(line_plan, lambda world: line_plan(world, y=aside)))
+    for step in range(20):
+        policy.act(floor(robot_pose=[0.15 * step, 0, 0], time=float(step)))
+        if len(policy.planner.asked) == 2:
+            break
+    assert len(policy.planner.asked) == 2
+    assert (policy.current_plan.poses[-1, 1] == 0.0) == is_kept
+
+
 def test_urgent_reasons():
     assert {reason for reason in Reason if not reason.urgent} == {
         Reason.OBJECTS,
+        Reason.TIGHT,
         Reason.SURPRISE,
         Reason.PERIOD,
     }
