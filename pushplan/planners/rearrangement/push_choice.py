@@ -283,6 +283,8 @@ def _first_push(scene: PushScene, approach: ApproachTree, push: Push) -> Simulat
 
     A push that is begun is finished: the next decision would begin with the same one.
     """
+    if scene.is_jammed:
+        return None
     target = int(np.flatnonzero(scene.movables.ids == push.target)[0])
     found = _simulated(scene, approach, push, target)
     if found is None or not math.isfinite(found.cost):

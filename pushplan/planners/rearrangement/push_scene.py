@@ -203,6 +203,13 @@ class PushScene:
         """The contact model, with memory for one caller."""
         return interaction.QuasiStatic(self.bodies, *self.settings)
 
+    @cached_property
+    def is_jammed(self) -> bool:
+        """True if the robot stands in something static, as far as is known: it has to get out."""
+        path = np.stack([self.world.robot_pose] * 2)
+        out = np.empty((2, len(self.poses), 3))
+        return self.contacts().sweep(path, self.poses.copy(), out) >= 0
+
     def are_done(self, poses: FloatArray) -> BoolArray:
         """(K,) whether objects at poses (K, 3) are where they belong."""
         done: BoolArray = core.all_done(poses, self.bodies, self.object_goal)

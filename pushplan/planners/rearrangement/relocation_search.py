@@ -259,6 +259,8 @@ class RelocationSearch:
 
     def _arrived(self, state: _State) -> _State | None:
         """A start as the route to it leaves robot and objects; None if there is none."""
+        if self._scene.is_jammed:
+            return None
         for tree in (self._approach, self._around_object):
             route = find_route(self._scene, tree, state.start, self._k)
             if route is None:

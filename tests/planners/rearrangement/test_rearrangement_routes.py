@@ -9,7 +9,13 @@ import shapely
 from conftest import make_boxes
 
 from pushplan.control import LegFollower
-from pushplan.planners.rearrangement import PushScene, RearrangementConfig
+from pushplan.planners import make_policy
+from pushplan.planners.rearrangement import (
+    PushScene,
+    RearrangementConfig,
+    push_choice,
+    relocation_search,
+)
 from pushplan.planners.rearrangement.approach import (
     approach_tree,
     find_route,
@@ -142,3 +148,23 @@ def test_a_robot_drives_off_the_box_that_it_has_pushed_before_it_turns(heading, 
     simulated = simulate_route(scene, route)
     assert simulated is not None
     assert path_lengths(simulated[1]).max() < 0.02
+
+
+def test_a_robot_that_stands_in_a_wall_gets_out_before_it_looks_for_routes(monkeypatch):
+    """All of its routes jam where they begin: a search through them took most of a minute."""
+    front = box_delivery_robot().vertices[:, 0].max()
+    searches = []
+
+    def counted(*arguments):
+        searches.append(arguments)
+        return find_route(*arguments)
+
+    for module in (push_choice, relocation_search):
+        monkeypatch.setattr(module, "find_route", counted)
+    for inside in (0.02, -0.3):
+        scene = among_columns((-2.7 - front + inside, 0.2, 0.0))
+        policy = make_policy("gtsp-mpc")
+        policy.reset(scene.world, np.random.default_rng(0))
+        twist = policy.act(scene.world, None)
+        assert (twist.linear, twist.angular) != (0.0, 0.0)
+        assert bool(searches) == (inside < 0.0)
