@@ -35,9 +35,12 @@ AS_PUBLISHED = "ship-lattice-published"
 ITERATIONS = {"ship-predictive-published": 40}
 PLANNERS = planner_names()
 COUNTS = [4, pytest.param(150, marks=pytest.mark.slow)]
+BOATS = {name: 200 for name in PLANNERS if name.startswith("ship")}
+BOATS |= {"ship-predictive-network": 20, "ship-predictive-published": 20}
+"""Worlds of the planners of ships, whose calls take up to a second."""
 MANY = [
-    *((name, 40) for name in PLANNERS if not name.startswith("ship")),
-    *(pytest.param(name, 2000, marks=pytest.mark.slow) for name in PLANNERS),
+    *((name, 40) for name in PLANNERS if name not in BOATS),
+    *(pytest.param(name, BOATS.get(name, 2000), marks=pytest.mark.slow) for name in PLANNERS),
 ]
 FEW = [2, pytest.param(40, marks=pytest.mark.slow)]
 
