@@ -33,7 +33,7 @@ def check_plan(world: World, plan: Plan, status: PlanStatus) -> None:
 
 
 def check_no_way(world: World, seed: int) -> None:
-    """Where no plan is possible: no disc gets to the goal, or the robot fits at no pose in it."""
+    """Check that no plan exists: no disc reaches the goal, or the robot fits at no pose in it."""
     robot, goal, static = world.robot, world.goal, world.static
     radius = 0.98 * robot.inscribed_radius
     walls = [shapely.Polygon(part).buffer(radius) for part in static.convex_parts]

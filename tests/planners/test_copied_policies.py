@@ -53,7 +53,7 @@ def scene(name, policy):
 
 
 def go_on(policy, env, observation, steps):
-    """What a policy asks for, and what comes of it."""
+    """Actions of a policy, with the world and the observation after each."""
     shown = []
     for _ in range(steps):
         action = env.encode(policy.act(env.world, observation))
