@@ -17,6 +17,7 @@ import resource
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from enum import Enum
 from types import ModuleType
 from typing import Any
 
@@ -26,7 +27,6 @@ import numpy as np
 # as the work. Each is called by one module of Python, which makes them from one checked object.
 # They are called with wrong types only, which nanobind refuses, and not with right ones.
 TABLES_OF_ONE_MAKER = {
-    "control.TrackingAssembly": "arrays of one number of steps, which only tests hand over",
     "envs.PlanarSimulator": "addresses of an engine, and states of its bodies",
     "gtsp.Problem.__init__": "tables that gtsp makes of one checked graph",
     "gtsp.RuinRecreate.narrow": "a part of the same tables",
@@ -96,7 +96,6 @@ VALID: dict[str, Any] = {
     "goal": [0.0, 2.0, 2.0, 0.5, 0.0],
     "view": [0.0, 0.0, 0.0, 8.0, 8.0, 0.5, 0.5],
     "limits": [-1.0, 1.0, 1.0, 0.5, 0.5, 0.0],
-    "scales": [1.0, 1.0, 1.0],
     "evidence": [1.5, -0.4, -2.0, 4.5],
     "bearings": [0.0, 1.0],
     "passed": [1.0, 2.0],
@@ -117,7 +116,6 @@ VALID: dict[str, Any] = {
     "normals": np.full((3, 2), 0.5),
     "curvatures": [-0.5, 0.5],
     "wanted": [True, False],
-    "loaded": [True, False],
     "values": np.ones((4, 4)),
     "walls": None,
     "arcs": [[0.5, 0.2], [0.5, 0.0]],
@@ -130,31 +128,22 @@ VALID: dict[str, Any] = {
     "last": 2,
     "first": 0,
     "longest": 20,
-    "capacity": 100,
     "half": 20,
     "headings": 16,
     "budget": 50,
     "upto": 50,
     "most": 5,
     "seed": 3,
-    "memory": 1.0,
     # geometry
     "geometry.transform_outlines.out": np.zeros((8, 2)),
-    "geometry.Obstacles.free_points.box": WIDE,
     "geometry.Obstacles.fill_clearance.out": np.zeros((4, 4)),
     "geometry.Obstacles.fill_clearance.last": 16,
-    "geometry.GoalScene.fill_distances.out": np.zeros((4, 4)),
-    "geometry.VisibilitySearch.start": [-2.0, -2.0],
-    "geometry.GoalEstimate.start": [-2.0, -2.0],
-    "geometry.CoveredSides.box": WIDE,
-    "geometry.relax.starts": [0, 1, 2],
-    "geometry.relax.ends": [1, 0],
-    "geometry.segment_crossings.first": np.array([[0.0, 0.0, 1.0, 1.0]]),
-    "geometry.segment_crossings.second": np.array([[0.0, 1.0, 1.0, 0.0]]),
-    "geometry.Corners.first": [0, 1, 2],
-    "geometry.Corners.owner": [0, 1],
+    "geometry.StaticMap.lines": [[0.0, 3.0, 2.0, 3.0], [5.0, 5.0, 5.0, 5.0]],
+    "geometry.ShortestPath.start": [-2.0, -2.0],
+    "geometry.GoalDistances.path_from.start": [-2.0, -2.0],
+    "geometry.GoalDistances.fill.out": np.zeros((4, 4)),
+    "geometry.GrownMap.fill_bend_distances.table": np.zeros((4, 4, 208)),
     "geometry.sample_points.out": np.zeros(2),
-    "geometry.fill_bend_distances.table": np.zeros((4, 4, 2)),
     # gtsp
     "gtsp.Problem.costs": np.ones((3, 6)),
     "gtsp.Problem.reverse": np.ones((3, 6)),
@@ -206,48 +195,29 @@ VALID: dict[str, Any] = {
     "motion.PoseLattice.planes": [[1.0, 0.0, 9.0]],
     "motion.PoseLattice.goal": [1.0, 1.0, 0.0, 0.5],
     "motion.PoseLattice.row_bounds": np.zeros((1, 2)),
-    "motion.PoseLattice.primitive": 0,
-    "motion.PoseLattice.edge_cost.primitive": 0,
     "motion.LatticeSearch.size": 4,
     "motion.swath_sum.sums": np.zeros(9),
     "motion.swath_sum.runs": [[0, 1]],
     "motion.swath_sum.begin": 0,
     "motion.sweep_cells.reach": 6.0,
-    "motion.ConvexObstacles.vertices": HIGHER,
-    "motion.ConvexObstacles.boxes": AROUND + UP,
-    "motion.ConvexObstacles.groups": [[0.0, 5.0, 4.0, 6.0]],
-    "motion.SweptPath.poses": PATH,
-    "motion.SweptPath.curvatures": np.zeros(8),
-    "motion.SweptPath.objects": np.tile([[0.0, 0.0, 0.0], [2.0, 0.5, 0.3]], (8, 1, 1)),
-    "motion.SweptPath.lengths": np.zeros(8),
-    "motion.SweptPath.works": np.zeros(8),
-    "motion.sweep_cost.count": 5,
-    "motion.shortcut.count": 5,
+    "motion.MoreObstacles.vertices": HIGHER,
     "motion.fill_speed_profile.curvatures": np.zeros(8),
     "motion.fill_speed_profile.chords": np.full(7, 0.2),
     "motion.fill_speed_profile.times": np.zeros(8),
     "motion.fill_speed_profile.speeds": np.zeros(8),
     "motion.fill_speed_profile.turn_rates": np.zeros(8),
-    "motion.turn_freely.out": np.zeros((2, 3)),
-    "motion.add_cell_weights.out": np.zeros((4, 4)),
-    "motion.add_cell_weights.within": [[0, 0, 2, 2], [0, 0, 2, 2]],
+    "motion.Reachable.start": [-2.0, -2.0],
     "motion.recovery_path.steps": [[0.04, 0.0], [0.0, 0.08]],
+    # navigation
+    "navigation.Robot.vertices": SQUARES - 0.5,
+    "navigation.Robot.limits": [1.0, 0.5, 0.0, 0.5, 0.0, np.inf, np.inf],
+    "navigation.World.pose": [-5.0, -5.0, 0.0],
+    "navigation.World.goal": [0.0, 6.0, -6.0, 0.5, 0.0, np.nan, 0.0],
     # observation
     "observation.to_pixels.out": np.zeros((2, 2)),
     "observation.fill_hidden.table": np.zeros((4, 4, 2)),
     "observation.fill_hidden.bends": [0, 1],
     # planners
-    "planners.CostToGo.size": 15.0,
-    "planners.PushTree.nodes": 100,
-    "planners.PushTree.objects": 2,
-    "planners.PushTree.rows": 4,
-    "planners.PushTree.columns": 4,
-    "planners.PushTree.headings": 32,
-    "planners.PushTree.cost.node": 0,
-    "planners.PushTree.arcs_to.node": 0,
-    "planners.push_search.size": 200,
-    "planners.push_search.bound": 1e6,
-    "planners.grow.draws": np.full((3, 6), 0.5),
     "planners.RolloutProblem.substeps": 2,
     "planners.Rollouts.paths": np.zeros((2, 7, 3)),
     "planners.Rollouts.twists": np.zeros((2, 3, 2)),
@@ -284,19 +254,8 @@ VALID: dict[str, Any] = {
     "control.ReferencePath.poses": PATH,
     "control.ReferencePath.lengths": 0.2 * np.arange(8),
     "control.ReferencePath.speeds": np.ones(8),
-    "control.QuadraticProgram.variables": 4,
-    "control.QuadraticProgram.moves": 2,
-    "control.QuadraticProgram.blocks": [0, 2],
-    "control.QuadraticProgram.solve.hessian": np.eye(4),
-    "control.QuadraticProgram.solve.gradient": np.ones(4),
-    "control.QuadraticProgram.solve.low": -np.ones(8),
-    "control.QuadraticProgram.solve.high": np.ones(8),
-    "control.QuadraticProgram.solve.x": np.zeros(4),
     "control.Tracker.steps": 2,
     "control.Tuning.optimise_speed": True,
-    "control.TrackingAssembly.variables": 4,
-    "control.TrackingAssembly.assemble.hessian": np.zeros((4, 4)),
-    "control.TrackingAssembly.assemble.gradient": np.zeros(4),
     # rearrangement
     "rearrangement.cost_to_go.costs": np.ones((3, 2)),
     "rearrangement.cost_to_go.delivers": [1, 2],
@@ -328,7 +287,6 @@ VALID: dict[str, Any] = {
     "search.SearchTree.size": 4,
     "search.SearchTree.offer.parent": -1,
     "search.GridDijkstra.weights": np.ones((4, 4)),
-    "search.GridDijkstra.goals": np.zeros((4, 4)),
     "search.GridDijkstra.settle.goals": np.zeros((4, 4)),
 }
 
@@ -341,12 +299,18 @@ def pushed_box() -> tuple[Any, ...]:
     return [pushing.Face(np.array([1.0, 0.0, 0.0]), contact, 0.0, -1.0)], parts, 0.0
 
 
+# Classes without a constructor, and what makes one.
+MADE_BY = {
+    "geometry.GrownMap": "geometry.StaticMap.grown",
+    "geometry.Obstacles": "geometry.GrownMap.obstacles",
+    "motion.RoomExploration": "motion.explore_ahead",
+}
 # What an object needs before it answers.
 PREPARED = {
     "pushing.PushTracker": lambda tracker: tracker.begin(*pushed_box()),
     "search.SearchTree": lambda tree: (tree.clear(), tree.offer(1, 0.5, 0.5, -1, 0)),
-    "planners.PushTree": lambda tree: tree.plant(
-        np.array([-1.0, 0.0, 0.0]), np.array(VALID["objects"]), 1.0
+    "navigation.World": lambda world: world.set_objects(
+        *map(np.array, (SQUARES, OFFSETS, VALID["first_parts"], VALID["poses"])), *np.ones((2, 2))
     ),
 }
 
@@ -464,6 +428,8 @@ class Caller:
             return [self.valid(owner, parameter("item", wanted.dtype)) for _ in range(2)]
         if wanted.kind.startswith("object"):
             return None
+        if wanted.kind == "str":
+            return self.instance("navigation.World").written()
         if wanted.kind.endswith(" | None") and self.random.random() < 0.5:
             return None
         return self.instance(wanted.kind.removesuffix(" | None"))
@@ -483,13 +449,24 @@ class Caller:
 
     def instance(self, name: str) -> Any:
         """An object of a class of the core, perhaps of wrong arguments."""
-        if name == "planners.PushSearch":
-            search = next(s for s in self.all_of("planners") if s.name == "planners.push_search")
-            return self.rooms["planners"].push_search(*self.arguments(search))
         room, short = name.split(".")
-        made = getattr(self.rooms[room], short)(*self.arguments(self.constructors[name]))
+        kind = getattr(self.rooms[room], short)
+        if issubclass(kind, Enum):
+            return next(iter(kind))
+        if maker := MADE_BY.get(name):
+            made = self.bound(maker)
+            signatures = [one for one in self.all_of(room) if one.name == maker]
+            return made(*self.arguments(signatures[0])) if signatures else made
+        made = kind(*self.arguments(self.constructors[name]))
         PREPARED.get(name, lambda _: None)(made)
         return made
+
+    def bound(self, name: str) -> Any:
+        """A function, a method of an object that is made for it, or a class."""
+        room, short, *method = name.removesuffix(".__init__").split(".")
+        if method:
+            return getattr(self.instance(f"{room}.{short}"), method[0])
+        return getattr(self.rooms[room], short)
 
     def all_of(self, room: str) -> tuple[Signature, ...]:
         return signatures_of(self.rooms[room])
@@ -527,6 +504,8 @@ class Caller:
         elif wanted.kind == "tuple" and len(right) > 0:
             yield right[:-1]
             yield (*right, right[0])
+        elif wanted.kind == "str":
+            yield from (right[1:], right[: len(right) // 2], right.replace("0", "-1"))
         elif wanted.kind not in ("bool", "list"):
             yield self.rooms["search"].SearchTree(2)
 
@@ -580,14 +559,9 @@ class Caller:
             arguments = self.arguments(signature)
             if position >= 0:
                 arguments[position] = wrong
-            room, name, *method = signature.name.split(".")
-            bound = getattr(self.rooms[room], name)
-            if method == ["__init__"]:
-                self.use(signature.name.removesuffix(".__init__"), bound(*arguments))
-            elif method:
-                getattr(self.instance(f"{room}.{name}"), method[0])(*arguments)
-            else:
-                bound(*arguments)
+            made = self.bound(signature.name)(*arguments)
+            if signature.name.endswith(".__init__"):
+                self.use(signature.name.removesuffix(".__init__"), made)
         except (TypeError, ValueError, OverflowError, IndexError, MemoryError) as error:
             self.refusals += 1
             self.last = f"{type(error).__name__}: {error}"
@@ -598,14 +572,19 @@ class Caller:
     def use(self, name: str, made: Any) -> None:
         """Ask an object all that it answers, for which ``made`` may hold wrong numbers."""
         PREPARED.get(name, lambda _: None)(made)
-        for attribute, bound in vars(type(made)).items():
-            if isinstance(bound, property):
-                getattr(made, attribute)
+        self.read(made)
         for signature in self.all_of(name.split(".")[0]):
             owner, _, method = signature.name.rpartition(".")
             if owner == name and method != "__init__" and not is_left_out(signature.name):
                 PREPARED.get(name, lambda _: None)(made)
-                getattr(made, method)(*self.arguments(signature))
+                self.read(getattr(made, method)(*self.arguments(signature)))
+
+    def read(self, made: Any) -> None:
+        """Read all properties of an object, and of the objects of the core that it holds."""
+        if type(made).__module__.startswith("pushplan._core"):
+            for attribute, bound in vars(type(made)).items():
+                if isinstance(bound, property):
+                    self.read(getattr(made, attribute))
 
     def run(self, random_calls: int) -> dict[str, Any]:
         invalid = []

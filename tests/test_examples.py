@@ -86,8 +86,6 @@ class TestWorlds:
         first, last = result.plan.object_poses[0, 0], result.plan.object_poses[-1, 0]
         x, y, turn = last - first
         assert y > 0.4 and abs(x) < 0.15 and abs(turn) < 0.1  # along the wall
-        quick = make_planner("push-aware").plan(world("blocked_door"), stop=MaxIterations(1000))
-        assert quick.status is PlanStatus.TIMED_OUT
 
     @pytest.mark.parametrize("planner", ["push-aware", "kinodynamic-rrt", "namo"])
     def test_the_box_in_the_door_of_the_room_is_pushed_although_there_is_a_way_around(

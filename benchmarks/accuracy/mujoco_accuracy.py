@@ -22,7 +22,7 @@ import numpy as np
 
 from benchmarks.reporting import command_line
 from pushplan.envs.simulators.base import Materials, Solids
-from pushplan.envs.simulators.mujoco_options import MujocoOptions
+from pushplan.envs.simulators.mujoco_model import MujocoOptions
 from pushplan.envs.simulators.mujoco_simulator import MujocoSimulator
 from pushplan.envs.tasks.ship_ice import ShipIceTask
 from pushplan.world import Drive, GoalDisc, Movables, RobotModel, StaticMap, Twist, World, stream

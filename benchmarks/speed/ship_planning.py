@@ -25,7 +25,7 @@ from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
 from pushplan.motion.state_lattice.lattice_search import open_search
 from pushplan.planners import make_planner
 from pushplan.planners.ship_lattice import ShipLatticeConfig
-from pushplan.planners.ship_lattice.ship_lattice_call import floe_costs
+from pushplan.planners.ship_lattice.ship_lattice import floe_costs
 from pushplan.world import Movables, Planner, World, stream
 from pushplan.world.checks import FloatArray
 

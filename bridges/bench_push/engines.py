@@ -32,8 +32,7 @@ from episodes import Run, file_of, mend, ours, whole
 from tables import ranges, write
 
 from pushplan.envs import PushEnv
-from pushplan.envs.simulators.pymunk_options import PymunkOptions
-from pushplan.envs.simulators.pymunk_simulator import PymunkSimulator
+from pushplan.envs.simulators.pymunk_simulator import PymunkOptions, PymunkSimulator
 from pushplan.evaluation import run_episode
 from pushplan.evaluation.run.policy_specs import parse_policies
 from pushplan.evaluation.statistics.estimates import estimate

@@ -11,6 +11,7 @@
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "pushplan/array.hpp"
@@ -20,8 +21,17 @@ namespace pushplan::bindings {
 
 namespace nb = nanobind;
 
+/// An array of NumPy as it is, whatever other arguments are converted to.
+template <class T, class Shape>
+struct Exact : nb::ndarray<T, Shape, nb::c_contig, nb::device::cpu> {
+  using Plain = nb::ndarray<T, Shape, nb::c_contig, nb::device::cpu>;
+
+  Exact() = default;
+  explicit Exact(Plain array) : Plain(std::move(array)) {}
+};
+
 template <class T, std::size_t Rank>
-using Array = nb::ndarray<T, nb::ndim<Rank>, nb::c_contig, nb::device::cpu>;
+using Array = Exact<T, nb::ndim<Rank>>;
 
 template <std::size_t Rank>
 using Floats = Array<const double, Rank>;
@@ -32,15 +42,10 @@ using FloatsOut = Array<double, Rank>;
 template <std::size_t Rank>
 using IntegersOut = Array<Index, Rank>;
 
-/// An argument that breaks a rule: an `InvalidInputError` of Python, which is a ValueError.
-class Refusal : public std::invalid_argument {
-  using std::invalid_argument::invalid_argument;
-};
-
-/// Refuses an argument.
+/// Refuses an argument that breaks a rule: an `InvalidInputError` of Python, which is a ValueError.
 [[noreturn]] inline void refuse(const char* name, const std::string& value,
                                 const std::string& rule) {
-  throw Refusal(std::string(name) + " must be " + rule + ", got " + value);
+  throw std::invalid_argument(std::string(name) + " must be " + rule + ", got " + value);
 }
 
 /// Requires an array to have exactly so many elements, rows or columns.
@@ -80,6 +85,10 @@ inline void require_indices(const char* name, std::span<const Index> values, Ind
 inline void require_finite(const char* name, double value) {
   if (!std::isfinite(value)) refuse(name, std::to_string(value), "finite");
 }
+template <class Array>
+void require_all_finite(const char* name, const Array& numbers) {
+  for (std::size_t i = 0; i < numbers.size(); ++i) require_finite(name, numbers.data()[i]);
+}
 inline void require_not_negative(const char* name, double value) {
   if (!(value >= 0.0)) refuse(name, std::to_string(value), "0 or more");
 }
@@ -112,15 +121,15 @@ auto view(const nb::ndarray<nb::numpy, T, nb::shape<Extents...>, nb::c_contig>& 
   return view(nb::ndarray<T, nb::shape<Extents...>, nb::c_contig, nb::device::cpu>(made));
 }
 
-using Poses = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
-using PosesOut = nb::ndarray<double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
-using Points = nb::ndarray<const double, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>;
-using PointsOut = nb::ndarray<double, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>;
+using Poses = Exact<const double, nb::shape<-1, 3>>;
+using PosesOut = Exact<double, nb::shape<-1, 3>>;
+using Points = Exact<const double, nb::shape<-1, 2>>;
+using PointsOut = Exact<double, nb::shape<-1, 2>>;
 /// So many numbers.
 template <nb::ssize_t Count>
-using Numbers = nb::ndarray<const double, nb::shape<Count>, nb::c_contig, nb::device::cpu>;
+using Numbers = Exact<const double, nb::shape<Count>>;
 template <nb::ssize_t Count>
-using NumbersOut = nb::ndarray<double, nb::shape<Count>, nb::c_contig, nb::device::cpu>;
+using NumbersOut = Exact<double, nb::shape<Count>>;
 using OnePose = Numbers<3>;
 using OnePoseOut = NumbersOut<3>;
 
@@ -234,6 +243,7 @@ void bind_gtsp(nb::module_& module);
 void bind_interaction(nb::module_& module);
 void bind_motion(nb::module_& module);
 void bind_motion_paths(nb::module_& module);
+void bind_navigation(nb::module_& module);
 void bind_observation(nb::module_& module);
 void bind_perception(nb::module_& module);
 void bind_planners(nb::module_& module);
@@ -243,3 +253,19 @@ void bind_scenarios(nb::module_& module);
 void bind_search(nb::module_& module);
 
 }  // namespace pushplan::bindings
+
+/// Reads the arrays of `Exact`.
+template <class T, class Shape>
+struct nanobind::detail::type_caster<pushplan::bindings::Exact<T, Shape>> {
+  using Array = pushplan::bindings::Exact<T, Shape>;
+  using PlainCaster = make_caster<typename Array::Plain>;
+  NB_TYPE_CASTER(Array, PlainCaster::Name)
+
+  bool from_python(handle source, std::uint32_t flags, cleanup_list* cleanup) noexcept {
+    PlainCaster plain;
+    const std::uint32_t exact = flags & ~static_cast<std::uint32_t>(cast_flags::convert);
+    if (!plain.from_python(source, exact, cleanup)) return false;
+    value = Array(std::move(plain.value));
+    return true;
+  }
+};

@@ -39,22 +39,6 @@ auto recorded(const PlanarSimulator& simulator) {
 
 void bind_envs(nb::module_& module) {
   module.def(
-      "slow_down",
-      [](const Poses& velocities, const Floats<1>& keeps, const Floats<2>& drag, double h) {
-        require_count("keeps", keeps.shape(0), velocities.shape(0));
-        require_count("drag", drag.shape(0), velocities.shape(0));
-        const Momentum momentum{view(keeps), {}, rows_as<const BodyDrag>(drag)};
-        const auto kept = zeros<double, 2>({velocities.shape(0), 3});
-        const auto before = rows_as<const Twist>(velocities);
-        const auto after = rows_as<Twist>(kept);
-        for (std::size_t i = 0; i < before.size(); ++i) {
-          after[i] = momentum.after(static_cast<Index>(i), before[i], h);
-        }
-        return kept;
-      },
-      "velocities"_a.noconvert(), "keeps"_a.noconvert(), "drag"_a.noconvert(), "h"_a);
-
-  module.def(
       "flow_shapes",
       [](const Points& vertices, const Integers<1>& offsets) {
         const Polygons bodies = polygons(vertices, offsets);
@@ -62,7 +46,7 @@ void bind_envs(nb::module_& module) {
         flow_shapes(bodies, rows_as<FlowShape>(shapes));
         return shapes;
       },
-      "vertices"_a.noconvert(), "offsets"_a.noconvert(),
+      "vertices"_a, "offsets"_a,
       "(K, 4) mean width [m], area [m^2], two integrals of rotation [m^4, m^5] of convex bodies.");
 
   nb::class_<Reach>(module, "Reach", "Objects that a step of the robot can affect.")
@@ -74,8 +58,7 @@ void bind_envs(nb::module_& module) {
             require_count("radii", radii.shape(0), objects.count());
             new (self) Reach({polygons(parts, part_offsets), objects, view(radii)});
           },
-          "parts"_a.noconvert(), "part_offsets"_a.noconvert(), "vertices"_a.noconvert(),
-          "offsets"_a.noconvert(), "radii"_a.noconvert(), nb::keep_alive<1, 2>(),
+          "parts"_a, "part_offsets"_a, "vertices"_a, "offsets"_a, "radii"_a, nb::keep_alive<1, 2>(),
           nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>(), nb::keep_alive<1, 5>(),
           nb::keep_alive<1, 6>());
 
@@ -112,11 +95,10 @@ void bind_envs(nb::module_& module) {
                 {travel, tolerance, rest, decay, samples, holds}, rows_as<BodyState>(states));
           },
           "functions"_a, "space"_a, "bodies"_a, "shapes"_a, "owner"_a, "reach"_a, "obstacles"_a,
-          "keeps"_a.noconvert(), "inertia"_a.noconvert(), "drag"_a.noconvert(),
-          "states"_a.noconvert(), "travel"_a, "tolerance"_a, "rest"_a, "decay"_a, "samples"_a,
-          "holds"_a, nb::keep_alive<1, 6>(), nb::keep_alive<1, 7>(), nb::keep_alive<1, 8>(),
-          nb::keep_alive<1, 9>(), nb::keep_alive<1, 10>(), nb::keep_alive<1, 11>(),
-          nb::keep_alive<1, 12>())
+          "keeps"_a, "inertia"_a, "drag"_a, "states"_a, "travel"_a, "tolerance"_a, "rest"_a,
+          "decay"_a, "samples"_a, "holds"_a, nb::keep_alive<1, 6>(), nb::keep_alive<1, 7>(),
+          nb::keep_alive<1, 8>(), nb::keep_alive<1, 9>(), nb::keep_alive<1, 10>(),
+          nb::keep_alive<1, 11>(), nb::keep_alive<1, 12>())
       .def(
           "step",
           [](PlanarSimulator& self, double linear, double angular, double lateral,
@@ -131,7 +113,7 @@ void bind_envs(nb::module_& module) {
           "sweep",
           [](PlanarSimulator& self, const OnePose& to, const OnePose& motion, double length,
              double duration) { return self.sweep(pose(to), pose(motion), length, duration); },
-          "to"_a.noconvert(), "motion"_a.noconvert(), "length"_a, "duration"_a,
+          "to"_a, "motion"_a, "length"_a, "duration"_a,
           "Drive straight to a pose; False if the robot was held.")
       .def("clear_for", &PlanarSimulator::clear_for, "linear"_a, "angular"_a, "lateral"_a,
            "limit"_a, "Time [s] for which the robot certainly touches nothing.")

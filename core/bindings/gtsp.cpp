@@ -62,11 +62,10 @@ void bind_gtsp(nb::module_& module) {
             new (self) gtsp::Problem{view(costs),   view(reverse), view(into),    view(onto),
                                      view(offsets), view(near),    view(between), symmetric};
           },
-          "costs"_a.noconvert(), "reverse"_a.noconvert(), "into"_a.noconvert(),
-          "onto"_a.noconvert(), "offsets"_a.noconvert(), "near"_a.noconvert(),
-          "between"_a.noconvert(), "symmetric"_a, nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(),
-          nb::keep_alive<1, 4>(), nb::keep_alive<1, 5>(), nb::keep_alive<1, 6>(),
-          nb::keep_alive<1, 7>(), nb::keep_alive<1, 8>());
+          "costs"_a, "reverse"_a, "into"_a, "onto"_a, "offsets"_a, "near"_a, "between"_a,
+          "symmetric"_a, nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>(),
+          nb::keep_alive<1, 5>(), nb::keep_alive<1, 6>(), nb::keep_alive<1, 7>(),
+          nb::keep_alive<1, 8>());
 
   nb::class_<gtsp::RuinRecreate>(module, "RuinRecreate",
                                  "Annealed ruin and recreate on orders of clusters.")
@@ -81,14 +80,14 @@ void bind_gtsp(nb::module_& module) {
             new (self) gtsp::RuinRecreate(problem, {max_removed, blink, reach},
                                           {places.begin(), places.end()}, seed);
           },
-          "problem"_a, "order"_a.noconvert(), "seed"_a, "max_removed"_a, "blink"_a, "reach"_a,
+          "problem"_a, "order"_a, "seed"_a, "max_removed"_a, "blink"_a, "reach"_a,
           nb::keep_alive<1, 2>())
       .def(
           "start",
           [](gtsp::RuinRecreate& self, const Integers<1>& order) {
             self.start(order_of(order, static_cast<Index>(self.current().order.size())));
           },
-          "order"_a.noconvert(), ReleaseGil())
+          "order"_a, ReleaseGil())
       .def("start_from_best", &gtsp::RuinRecreate::start_from_best)
       .def("run", &gtsp::RuinRecreate::run, "temperature"_a, "tolerance"_a, "rounds"_a,
            ReleaseGil())
@@ -97,7 +96,7 @@ void bind_gtsp(nb::module_& module) {
           [](gtsp::RuinRecreate& self, const gtsp::Problem& problem, const Integers<1>& kept) {
             self.narrow(problem, view(kept));
           },
-          "problem"_a, "kept"_a.noconvert(), nb::keep_alive<1, 2>())
+          "problem"_a, "kept"_a, nb::keep_alive<1, 2>())
       .def_prop_ro("cost", [](const gtsp::RuinRecreate& self) { return self.current().cost; })
       .def_prop_ro("best_cost", [](const gtsp::RuinRecreate& self) { return self.best().cost; })
       .def_prop_ro("random_state", &gtsp::RuinRecreate::random_state)
@@ -126,8 +125,7 @@ void bind_gtsp(nb::module_& module) {
          const IntegersOut<1>& needed) {
         gtsp::mark_needed(view(costs), view(reverse), view(offsets), view(needed));
       },
-      "costs"_a.noconvert(), "reverse"_a.noconvert(), "offsets"_a.noconvert(),
-      "needed"_a.noconvert(), ReleaseGil());
+      "costs"_a, "reverse"_a, "offsets"_a, "needed"_a, ReleaseGil());
 
   module.def(
       "fill_subsets",
@@ -135,8 +133,7 @@ void bind_gtsp(nb::module_& module) {
          const Integers<1>& sizes, const Floats<2>& first) {
         gtsp::fill_subsets(low, high, view(table), view(blocks), view(sizes), view(first));
       },
-      "low"_a, "high"_a, "table"_a.noconvert(), "blocks"_a.noconvert(), "sizes"_a.noconvert(),
-      "first"_a.noconvert(), ReleaseGil());
+      "low"_a, "high"_a, "table"_a, "blocks"_a, "sizes"_a, "first"_a, ReleaseGil());
 
   module.def(
       "extend_walks",
@@ -146,8 +143,8 @@ void bind_gtsp(nb::module_& module) {
         gtsp::extend_walks(view(walks), view(longer), view(blocks),
                            walk_clusters(prices, sizes, moves), low, high);
       },
-      "walks"_a.noconvert(), "longer"_a.noconvert(), "blocks"_a.noconvert(), "moves"_a.noconvert(),
-      "prices"_a.noconvert(), "sizes"_a.noconvert(), "low"_a, "high"_a, ReleaseGil());
+      "walks"_a, "longer"_a, "blocks"_a, "moves"_a, "prices"_a, "sizes"_a, "low"_a, "high"_a,
+      ReleaseGil());
 
   module.def(
       "read_visits",
@@ -157,8 +154,7 @@ void bind_gtsp(nb::module_& module) {
         return gtsp::read_visits(view(walks), view(first), view(blocks),
                                  walk_clusters(prices, sizes, moves), view(visits));
       },
-      "walks"_a.noconvert(), "first"_a.noconvert(), "blocks"_a.noconvert(), "moves"_a.noconvert(),
-      "prices"_a.noconvert(), "sizes"_a.noconvert(), "visits"_a.noconvert(), ReleaseGil());
+      "walks"_a, "first"_a, "blocks"_a, "moves"_a, "prices"_a, "sizes"_a, "visits"_a, ReleaseGil());
 
   module.def(
       "extend_paths",
@@ -171,9 +167,8 @@ void bind_gtsp(nb::module_& module) {
         return gtsp::extend_paths(bounds, paths_of<gtsp::ConstPaths>(paths), low, high, view(slots),
                                   paths_of<gtsp::Paths>(longer), found);
       },
-      "within"_a.noconvert(), "costs"_a.noconvert(), "lists"_a.noconvert(), "prices"_a.noconvert(),
-      "sizes"_a.noconvert(), "limit"_a, "paths"_a.noconvert(), "low"_a, "high"_a,
-      "slots"_a.noconvert(), "longer"_a.noconvert(), "found"_a, ReleaseGil());
+      "within"_a, "costs"_a, "lists"_a, "prices"_a, "sizes"_a, "limit"_a, "paths"_a, "low"_a,
+      "high"_a, "slots"_a, "longer"_a, "found"_a, ReleaseGil());
 }
 
 }  // namespace pushplan::bindings

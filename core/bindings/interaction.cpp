@@ -40,9 +40,19 @@ void bind_step(nb::class_<M> model) {
             require_objects(self, objects, lengths);
             return self.advance(pose(from), pose(to), poses(objects), view(lengths));
           },
-          "robot_from"_a.noconvert(), "robot_to"_a.noconvert(), "poses"_a.noconvert(),
-          "lengths"_a.noconvert(), ReleaseGil())
+          "robot_from"_a, "robot_to"_a, "poses"_a, "lengths"_a, ReleaseGil())
       .def_prop_ro("tests", &M::tests);
+}
+
+template <class M>
+nb::class_<M> bind_sweep(nb::class_<M> model) {
+  return model.def(
+      "sweep",
+      [](M& self, const Poses& path, const PosesOut& objects, const FloatsOut<3>& out) {
+        const auto rows = swept_poses(out, path, objects, self.bodies().radii.size());
+        return self.sweep(poses(path), poses(objects), rows);
+      },
+      "path"_a, "poses"_a, "out"_a, ReleaseGil());
 }
 
 void bind_portions(nb::module_& module) {
@@ -54,16 +64,14 @@ void bind_portions(nb::module_& module) {
         require_count("poses", bodies.shape(0), outlines.count());
         cover_objects(poses(bodies), outlines, raster_frame(frame, cell), view(out));
       },
-      "poses"_a.noconvert(), "vertices"_a.noconvert(), "offsets"_a.noconvert(),
-      "frame"_a.noconvert(), "cell"_a, "out"_a.noconvert(), ReleaseGil());
+      "poses"_a, "vertices"_a, "offsets"_a, "frame"_a, "cell"_a, "out"_a, ReleaseGil());
   module.def(
       "cover_sweep",
       [](const Poses& path, const Points& vertices, const Integers<1>& offsets,
          const OnePose& frame, double cell, const CoverageOut& out) {
         cover_sweep(poses(path), polygons(vertices, offsets), raster_frame(frame, cell), view(out));
       },
-      "path"_a.noconvert(), "vertices"_a.noconvert(), "offsets"_a.noconvert(),
-      "frame"_a.noconvert(), "cell"_a, "out"_a.noconvert(), ReleaseGil());
+      "path"_a, "vertices"_a, "offsets"_a, "frame"_a, "cell"_a, "out"_a, ReleaseGil());
   module.def(
       "step_works",
       [](const FloatsOut<3>& swept, const Floats<1>& masses, const FloatsOut<1>& works) {
@@ -71,7 +79,7 @@ void bind_portions(nb::module_& module) {
         require_count("masses", masses.shape(0), swept.shape(1));
         step_works(grid_as<Pose>(swept), view(masses), view(works));
       },
-      "swept"_a.noconvert(), "masses"_a.noconvert(), "works"_a.noconvert(), ReleaseGil());
+      "swept"_a, "masses"_a, "works"_a, ReleaseGil());
   module.def(
       "sweep_near",
       [](const Poses& path, const PosesOut& floes, const IceBodies& bodies, double step,
@@ -82,9 +90,8 @@ void bind_portions(nb::module_& module) {
         sweep_near(poses(path), poses(floes), bodies,
                    {step, iterations, hull_friction, friction, still}, margin, rows, view(works));
       },
-      "path"_a.noconvert(), "poses"_a.noconvert(), "bodies"_a, "step"_a, "iterations"_a,
-      "hull_friction"_a, "friction"_a, "still"_a, "margin"_a, "out"_a.noconvert(),
-      "works"_a.noconvert(), ReleaseGil());
+      "path"_a, "poses"_a, "bodies"_a, "step"_a, "iterations"_a, "hull_friction"_a, "friction"_a,
+      "still"_a, "margin"_a, "out"_a, "works"_a, ReleaseGil());
 }
 
 }  // namespace
@@ -121,45 +128,27 @@ void bind_interaction(nb::module_& module) {
                               walls,
                               rows_as<const Box>(wall_boxes)};
           },
-          "robot_vertices"_a.noconvert(), "robot_offsets"_a.noconvert(), "wall_parts"_a,
-          "robot_radius"_a, "vertices"_a.noconvert(), "offsets"_a.noconvert(),
-          "part_vertices"_a.noconvert(), "part_offsets"_a.noconvert(), "first_parts"_a.noconvert(),
-          "radii"_a.noconvert(), "inverse_masses"_a.noconvert(), "inverse_gyration"_a.noconvert(),
-          "wall_vertices"_a.noconvert(), "wall_offsets"_a.noconvert(), "wall_boxes"_a.noconvert(),
-          nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(), nb::keep_alive<1, 6>(),
+          "robot_vertices"_a, "robot_offsets"_a, "wall_parts"_a, "robot_radius"_a, "vertices"_a,
+          "offsets"_a, "part_vertices"_a, "part_offsets"_a, "first_parts"_a, "radii"_a,
+          "inverse_masses"_a, "inverse_gyration"_a, "wall_vertices"_a, "wall_offsets"_a,
+          "wall_boxes"_a, nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(), nb::keep_alive<1, 6>(),
           nb::keep_alive<1, 7>(), nb::keep_alive<1, 8>(), nb::keep_alive<1, 9>(),
           nb::keep_alive<1, 10>(), nb::keep_alive<1, 11>(), nb::keep_alive<1, 12>(),
           nb::keep_alive<1, 13>(), nb::keep_alive<1, 14>(), nb::keep_alive<1, 15>(),
           nb::keep_alive<1, 16>());
 
-  nb::class_<QuasiStatic>(module, "QuasiStatic", "Quasi-static pushing with memory for one thread.")
-      .def(
-          "__init__",
-          [](QuasiStatic* self, const Bodies& bodies, double max_step, double tolerance,
-             double jam_depth, Index iterations, double friction, double static_friction) {
-            new (self) QuasiStatic(
-                bodies, {max_step, tolerance, jam_depth, iterations, friction, static_friction});
-          },
-          "bodies"_a, "max_step"_a, "tolerance"_a, "jam_depth"_a, "iterations"_a, "friction"_a,
-          "static_friction"_a, nb::keep_alive<1, 2>())
-      .def(
-          "advance",
-          [](QuasiStatic& self, const OnePose& from, const OnePose& to, const PosesOut& objects,
-             const FloatsOut<1>& lengths) {
-            require_objects(self, objects, lengths);
-            return self.advance(pose(from), pose(to), poses(objects), view(lengths));
-          },
-          "robot_from"_a.noconvert(), "robot_to"_a.noconvert(), "poses"_a.noconvert(),
-          "lengths"_a.noconvert(), ReleaseGil())
-      .def(
-          "sweep",
-          [](QuasiStatic& self, const Poses& path, const PosesOut& objects,
-             const FloatsOut<3>& out) {
-            const auto rows = swept_poses(out, path, objects, self.bodies().radii.size());
-            return self.sweep(poses(path), poses(objects), rows);
-          },
-          "path"_a.noconvert(), "poses"_a.noconvert(), "out"_a.noconvert(), ReleaseGil())
-      .def_prop_ro("tests", &QuasiStatic::tests);
+  bind_step(bind_sweep(
+      nb::class_<QuasiStatic>(module, "QuasiStatic",
+                              "Quasi-static pushing with memory for one thread.")
+          .def(
+              "__init__",
+              [](QuasiStatic* self, const Bodies& bodies, double max_step, double tolerance,
+                 double jam_depth, Index iterations, double friction, double static_friction) {
+                new (self) QuasiStatic(bodies, {max_step, tolerance, jam_depth, iterations,
+                                                friction, static_friction});
+              },
+              "bodies"_a, "max_step"_a, "tolerance"_a, "jam_depth"_a, "iterations"_a, "friction"_a,
+              "static_friction"_a, nb::keep_alive<1, 2>())));
 
   nb::class_<IceBodies>(module, "IceBodies", "A hull among floes.")
       .def(
@@ -179,30 +168,23 @@ void bind_interaction(nb::module_& module) {
                                  view(masses),
                                  view(inverse_gyration)};
           },
-          "hull_vertices"_a.noconvert(), "hull_offsets"_a.noconvert(), "hull_radius"_a,
-          "vertices"_a.noconvert(), "offsets"_a.noconvert(), "first_parts"_a.noconvert(),
-          "radii"_a.noconvert(), "masses"_a.noconvert(), "inverse_gyration"_a.noconvert(),
-          nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(), nb::keep_alive<1, 5>(),
-          nb::keep_alive<1, 6>(), nb::keep_alive<1, 7>(), nb::keep_alive<1, 8>(),
-          nb::keep_alive<1, 9>(), nb::keep_alive<1, 10>());
+          "hull_vertices"_a, "hull_offsets"_a, "hull_radius"_a, "vertices"_a, "offsets"_a,
+          "first_parts"_a, "radii"_a, "masses"_a, "inverse_gyration"_a, nb::keep_alive<1, 2>(),
+          nb::keep_alive<1, 3>(), nb::keep_alive<1, 5>(), nb::keep_alive<1, 6>(),
+          nb::keep_alive<1, 7>(), nb::keep_alive<1, 8>(), nb::keep_alive<1, 9>(),
+          nb::keep_alive<1, 10>());
 
-  nb::class_<IceContacts>(module, "IceContacts",
-                          "Floes that push floes, with memory for one thread.")
-      .def(
-          "__init__",
-          [](IceContacts* self, const IceBodies& bodies, double step, Index iterations,
-             double hull_friction, double friction, double still) {
-            new (self) IceContacts(bodies, {step, iterations, hull_friction, friction, still});
-          },
-          "bodies"_a, "step"_a, "iterations"_a, "hull_friction"_a, "friction"_a, "still"_a,
-          nb::keep_alive<1, 2>())
-      .def(
-          "sweep",
-          [](IceContacts& self, const Poses& path, const PosesOut& floes, const FloatsOut<3>& out) {
-            const auto rows = swept_poses(out, path, floes, self.bodies().radii.size());
-            return self.sweep(poses(path), poses(floes), rows);
-          },
-          "path"_a.noconvert(), "poses"_a.noconvert(), "out"_a.noconvert(), ReleaseGil());
+  bind_sweep(nb::class_<IceContacts>(module, "IceContacts",
+                                     "Floes that push floes, with memory for one thread.")
+                 .def(
+                     "__init__",
+                     [](IceContacts* self, const IceBodies& bodies, double step, Index iterations,
+                        double hull_friction, double friction, double still) {
+                       new (self)
+                           IceContacts(bodies, {step, iterations, hull_friction, friction, still});
+                     },
+                     "bodies"_a, "step"_a, "iterations"_a, "hull_friction"_a, "friction"_a,
+                     "still"_a, nb::keep_alive<1, 2>()));
 
   bind_step<IceInteraction>(
       nb::class_<IceInteraction>(module, "IceInteraction",
@@ -228,9 +210,8 @@ void bind_interaction(nb::module_& module) {
                                              reinterpret_cast<void*>(context), view(radii),
                                              view(inverse_masses));
               },
-              "function"_a, "context"_a, "radii"_a.noconvert(), "inverse_masses"_a.noconvert(),
-              "owner"_a = nb::none(), nb::keep_alive<1, 4>(), nb::keep_alive<1, 5>(),
-              nb::keep_alive<1, 6>(),
+              "function"_a, "context"_a, "radii"_a, "inverse_masses"_a, "owner"_a = nb::none(),
+              nb::keep_alive<1, 4>(), nb::keep_alive<1, 5>(), nb::keep_alive<1, 6>(),
               "Addresses of a `CalledInteraction::Advance` and of what it is given as its context; "
               "`owner` is kept alive for them."));
 

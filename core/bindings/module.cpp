@@ -38,7 +38,7 @@ NB_MODULE(_core, module) {
   nb::register_exception_translator([](const std::exception_ptr& thrown, void*) {
     try {
       std::rethrow_exception(thrown);
-    } catch (const pushplan::bindings::Refusal& refusal) {
+    } catch (const std::invalid_argument& refusal) {
       const auto errors = nb::module_::import_("pushplan.errors");
       PyErr_SetString(errors.attr("InvalidInputError").ptr(), refusal.what());
     }
@@ -59,6 +59,8 @@ NB_MODULE(_core, module) {
   pushplan::bindings::bind_envs(envs);
   auto gtsp = module.def_submodule("gtsp", "Parts of the GTSP solver.");
   pushplan::bindings::bind_gtsp(gtsp);
+  auto navigation = module.def_submodule("navigation", "The planner of paths that push.");
+  pushplan::bindings::bind_navigation(navigation);
   auto observation = module.def_submodule("observation", "Worlds drawn into images.");
   pushplan::bindings::bind_observation(observation);
   auto perception = module.def_submodule("perception", "Rays of sensors, and maps of scans.");

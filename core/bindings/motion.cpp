@@ -21,7 +21,7 @@ using namespace nb::literals;
 
 namespace {
 
-using Corner = nb::ndarray<const Index, nb::shape<2>, nb::c_contig, nb::device::cpu>;
+using Corner = Exact<const Index, nb::shape<2>>;
 using LatticeSearch = AStar<PoseLattice>;
 
 PathBuffer buffer(const PosesOut& out, const FloatsOut<1>& curvatures) {
@@ -29,7 +29,7 @@ PathBuffer buffer(const PosesOut& out, const FloatsOut<1>& curvatures) {
   return {poses(out), view(curvatures)};
 }
 
-using FiveArcs = nb::ndarray<double, nb::shape<5, 2>, nb::c_contig, nb::device::cpu>;
+using FiveArcs = Exact<double, nb::shape<5, 2>>;
 
 /// The numbers of `PoseLattice.goal` of Python.
 LatticeGoal lattice_goal(const Numbers<4>& numbers) {
@@ -46,30 +46,30 @@ void bind_paths(nb::module_& module) {
         std::copy(curve.arcs.begin(), curve.arcs.end(), reinterpret_cast<Arc*>(arcs.data()));
         return curve.length;
       },
-      "start"_a.noconvert(), "end"_a.noconvert(), "radius"_a, "reverses"_a, "arcs"_a.noconvert());
+      "start"_a, "end"_a, "radius"_a, "reverses"_a, "arcs"_a);
   module.def(
       "along_arc",
       [](const OnePose& start, double length, double curvature, const OnePoseOut& out) {
         *reinterpret_cast<Pose*>(out.data()) = along_arc(pose(start), {length, curvature});
       },
-      "start"_a.noconvert(), "length"_a, "curvature"_a, "out"_a.noconvert());
-  module.def("step_along", &step_along, "curvature"_a, "spacing"_a);
+      "start"_a, "length"_a, "curvature"_a, "out"_a);
   module.def(
       "sample_pieces",
       [](const OnePose& start, const Floats<2>& arcs, double spacing, const PosesOut& out,
          const FloatsOut<1>& curvatures) {
         return sample_arcs(pose(start), rows_as<const Arc>(arcs), spacing, buffer(out, curvatures));
       },
-      "start"_a.noconvert(), "pieces"_a.noconvert(), "spacing"_a, "out"_a.noconvert(),
-      "curvatures"_a.noconvert());
+      "start"_a, "pieces"_a, "spacing"_a, "out"_a, "curvatures"_a);
   module.def(
       "in_goal",
       [](double x, double y, const Numbers<5>& goal) { return goal_region(goal).contains({x, y}); },
-      "x"_a, "y"_a, "goal"_a.noconvert());
+      "x"_a, "y"_a, "goal"_a);
   module.def(
-      "distance_to_goal",
-      [](double x, double y, const Numbers<5>& goal) { return goal_region(goal).distance({x, y}); },
-      "x"_a, "y"_a, "goal"_a.noconvert());
+      "goal_is_outside",
+      [](const Numbers<5>& goal, const Numbers<4>& bounds) {
+        return goal_region(goal).is_outside(*reinterpret_cast<const Box*>(bounds.data()));
+      },
+      "goal"_a, "bounds"_a);
 }
 
 /// Requires a place on a map that may be large, but not so large that its cells cannot be counted.
@@ -97,17 +97,15 @@ void bind_maps(nb::module_& module) {
         add_floes({floes, points(centres), view(radii), {view(totals), exponent, soft}},
                   view(grid));
       },
-      "outlines"_a.noconvert(), "offsets"_a.noconvert(), "centres"_a.noconvert(),
-      "radii"_a.noconvert(), "totals"_a.noconvert(), "exponent"_a, "soft"_a, "grid"_a.noconvert(),
-      ReleaseGil());
+      "outlines"_a, "offsets"_a, "centres"_a, "radii"_a, "totals"_a, "exponent"_a, "soft"_a,
+      "grid"_a, ReleaseGil());
   module.def(
       "block",
       [](const Points& outlines, const Integers<1>& offsets, double margin,
          const FloatsOut<2>& grid) {
         block_cells(polygons(outlines, offsets), margin, view(grid));
       },
-      "outlines"_a.noconvert(), "offsets"_a.noconvert(), "margin"_a, "grid"_a.noconvert(),
-      ReleaseGil());
+      "outlines"_a, "offsets"_a, "margin"_a, "grid"_a, ReleaseGil());
   module.def(
       "prefix_sums",
       [](const Floats<2>& grid, const FloatsOut<2>& sums) {
@@ -115,7 +113,7 @@ void bind_maps(nb::module_& module) {
         require_count("columns of sums", sums.shape(1), grid.shape(0) + 1);
         prefix_sums(view(grid), view(sums));
       },
-      "grid"_a.noconvert(), "sums"_a.noconvert(), ReleaseGil());
+      "grid"_a, "sums"_a, ReleaseGil());
   module.def(
       "place_costs",
       [](const Floats<2>& sums, const Integers<1>& rows, Index goal_row, const Integers<1>& columns,
@@ -125,9 +123,8 @@ void bind_maps(nb::module_& module) {
                     {view(rows), view(columns), goal_row, between.first, between.second},
                     {half, reach, along, stage, factor, cell, lean}, view(costs));
       },
-      "sums"_a.noconvert(), "rows"_a.noconvert(), "goal_row"_a, "columns"_a.noconvert(),
-      "between"_a, "half"_a, "reach"_a, "along"_a, "stage"_a, "factor"_a, "cell"_a, "lean"_a,
-      "costs"_a.noconvert(), ReleaseGil());
+      "sums"_a, "rows"_a, "goal_row"_a, "columns"_a, "between"_a, "half"_a, "reach"_a, "along"_a,
+      "stage"_a, "factor"_a, "cell"_a, "lean"_a, "costs"_a, ReleaseGil());
 }
 
 constexpr Index kMostReach = 10'000;  // of primitives [steps]; 8 are usual
@@ -138,9 +135,10 @@ void bind_primitives(nb::module_& module) {
       [](double heading, double target, double radius, Index reach, double slack,
          const FloatsOut<2>& out) {
         require_between("reach", reach, 0, kMostReach);
-        return find_connections(heading, target, {radius, reach, slack}, rows_as<LatticeConnection>(out));
+        return find_connections(heading, target, {radius, reach, slack},
+                                rows_as<LatticeConnection>(out));
       },
-      "heading"_a, "target"_a, "radius"_a, "reach"_a, "slack"_a, "out"_a.noconvert(), ReleaseGil());
+      "heading"_a, "target"_a, "radius"_a, "reach"_a, "slack"_a, "out"_a, ReleaseGil());
   module.def(
       "primitive_boxes",
       [](const Floats<1>& headings, const Floats<3>& pieces, const Floats<1>& lengths,
@@ -151,8 +149,7 @@ void bind_primitives(nb::module_& module) {
         primitive_boxes(view(headings), rows_as<const std::array<Arc, 3>>(pieces), view(lengths),
                         rows_as<OriginBox>(boxes));
       },
-      "headings"_a.noconvert(), "pieces"_a.noconvert(), "lengths"_a.noconvert(),
-      "boxes"_a.noconvert(), ReleaseGil());
+      "headings"_a, "pieces"_a, "lengths"_a, "boxes"_a, ReleaseGil());
   module.def(
       "sweep_cells",
       [](double heading, const Floats<2>& pieces, const Points& vertices,
@@ -165,8 +162,7 @@ void bind_primitives(nb::module_& module) {
         }
         return copied_rows<Index>(std::span<const ColumnRun>(runs));
       },
-      "heading"_a, "pieces"_a.noconvert(), "vertices"_a.noconvert(), "offsets"_a.noconvert(),
-      "reach"_a, "spacing"_a, kOwned);
+      "heading"_a, "pieces"_a, "vertices"_a, "offsets"_a, "reach"_a, "spacing"_a, kOwned);
 }
 
 Index node_count(const PoseLattice& lattice) {
@@ -208,11 +204,9 @@ void bind_lattice(nb::module_& module) {
                                    view(place_costs),
                                    inflation};
           },
-          "rows"_a, "columns"_a, "step"_a, "cells"_a, "corner"_a.noconvert(), "first"_a.noconvert(),
-          "ends"_a.noconvert(), "lengths"_a.noconvert(), "boxes"_a.noconvert(),
-          "run_first"_a.noconvert(), "runs"_a.noconvert(), "cost_sums"_a.noconvert(),
-          "blocked_sums"_a.noconvert(), "stride"_a, "planes"_a.noconvert(), "goal"_a.noconvert(),
-          "row_bounds"_a.noconvert(), "place_costs"_a.noconvert(), "inflation"_a,
+          "rows"_a, "columns"_a, "step"_a, "cells"_a, "corner"_a, "first"_a, "ends"_a, "lengths"_a,
+          "boxes"_a, "run_first"_a, "runs"_a, "cost_sums"_a, "blocked_sums"_a, "stride"_a,
+          "planes"_a, "goal"_a, "row_bounds"_a, "place_costs"_a, "inflation"_a,
           nb::keep_alive<1, 7>(), nb::keep_alive<1, 8>(), nb::keep_alive<1, 9>(),
           nb::keep_alive<1, 10>(), nb::keep_alive<1, 11>(), nb::keep_alive<1, 12>(),
           nb::keep_alive<1, 13>(), nb::keep_alive<1, 14>(), nb::keep_alive<1, 16>(),
@@ -237,7 +231,7 @@ void bind_lattice(nb::module_& module) {
             });
             return count;
           },
-          "node"_a, "nodes"_a.noconvert(), "costs"_a.noconvert(), "edges"_a.noconvert())
+          "node"_a, "nodes"_a, "costs"_a, "edges"_a)
       .def(
           "place_of",
           [](const PoseLattice& self, Index node) {
@@ -261,20 +255,11 @@ void bind_lattice(nb::module_& module) {
           },
           "node"_a)
       .def(
-          "edge_cost",
-          [](const PoseLattice& self, Index row, Index column, Index primitive) {
-            require_index("row", row, self.rows);
-            require_index("column", column, self.columns);
-            require_index("primitive", primitive, static_cast<Index>(self.ends.size()));
-            return self.edge_cost(row, column, primitive);
-          },
-          "row"_a, "column"_a, "primitive"_a)
-      .def(
           "within",
           [](const PoseLattice& self, Index u, Index v, const Numbers<4>& box) {
             return within(self.planes, u, v, *reinterpret_cast<const OriginBox*>(box.data()));
           },
-          "row"_a, "column"_a, "box"_a.noconvert());
+          "row"_a, "column"_a, "box"_a);
   module.def(
       "swath_sum",
       [](const Floats<1>& sums, const Integers<2>& runs, Index begin, Index end, Index at) {
@@ -286,7 +271,7 @@ void bind_lattice(nb::module_& module) {
             all.subspan(static_cast<std::size_t>(begin), static_cast<std::size_t>(end - begin)),
             at);
       },
-      "sums"_a.noconvert(), "runs"_a.noconvert(), "begin"_a, "end"_a, "at"_a);
+      "sums"_a, "runs"_a, "begin"_a, "end"_a, "at"_a);
 
   nb::class_<LatticeSearch>(module, "LatticeSearch", "A* over a `PoseLattice`.")
       .def(
@@ -314,7 +299,6 @@ void bind_lattice(nb::module_& module) {
       .def("run", &LatticeSearch::run, "budget"_a, ReleaseGil())
       .def_prop_ro("goal", &LatticeSearch::goal)
       .def_prop_ro("cost", &LatticeSearch::cost)
-      .def_prop_ro("generated", &LatticeSearch::generated)
       .def_prop_ro(
           "tree", [](LatticeSearch& self) -> SearchTree& { return self.tree(); },
           nb::rv_policy::reference_internal);

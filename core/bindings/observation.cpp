@@ -24,15 +24,14 @@ void bind_observation(nb::module_& module) {
       [](const Numbers<7>& view, const Points& world, const PointsOut& out) {
         to_pixels(image_view(view), points(world), points_out(out, world.shape(0)));
       },
-      "view"_a.noconvert(), "points"_a.noconvert(), "out"_a.noconvert());
+      "view"_a, "points"_a, "out"_a);
   module.def(
       "fill_parts",
       [](const ImageOut& image, const Numbers<7>& numbers, const Points& vertices,
          const Integers<1>& offsets, std::uint8_t value) {
         fill_parts(view(image), image_view(numbers), polygons(vertices, offsets), value);
       },
-      "image"_a.noconvert(), "view"_a.noconvert(), "vertices"_a.noconvert(),
-      "offsets"_a.noconvert(), "value"_a, ReleaseGil());
+      "image"_a, "view"_a, "vertices"_a, "offsets"_a, "value"_a, ReleaseGil());
   module.def(
       "fill_bodies",
       [](const ImageOut& image, const Numbers<7>& numbers, const Poses& bodies,
@@ -43,8 +42,8 @@ void bind_observation(nb::module_& module) {
         require_count("radii", radii.shape(0), outlines.count());
         fill_bodies(view(image), image_view(numbers), poses(bodies), outlines, view(radii), value);
       },
-      "image"_a.noconvert(), "view"_a.noconvert(), "poses"_a.noconvert(), "vertices"_a.noconvert(),
-      "offsets"_a.noconvert(), "radii"_a.noconvert(), "value"_a, ReleaseGil());
+      "image"_a, "view"_a, "poses"_a, "vertices"_a, "offsets"_a, "radii"_a, "value"_a,
+      ReleaseGil());
   module.def(
       "sample",
       [](const ImageOut& image, const Numbers<7>& numbers,
@@ -52,8 +51,7 @@ void bind_observation(nb::module_& module) {
         require_room("values", values.size(), 1);
         sample_raster(view(image), image_view(numbers), {view(values), {x, y}, step});
       },
-      "image"_a.noconvert(), "view"_a.noconvert(), "values"_a.noconvert(), "x"_a, "y"_a, "step"_a,
-      ReleaseGil());
+      "image"_a, "view"_a, "values"_a, "x"_a, "y"_a, "step"_a, ReleaseGil());
   module.def(
       "fill_hidden",
       [](const ImageOut& image, const Numbers<7>& numbers, double x, double y, const Points& loops,
@@ -70,9 +68,8 @@ void bind_observation(nb::module_& module) {
                      view(lengths)},
                     per_metre);
       },
-      "image"_a.noconvert(), "view"_a.noconvert(), "x"_a, "y"_a, "loops"_a.noconvert(),
-      "offsets"_a.noconvert(), "table"_a.noconvert(), "origin"_a.noconvert(), "step"_a,
-      "bends"_a.noconvert(), "lengths"_a.noconvert(), "per_metre"_a, ReleaseGil());
+      "image"_a, "view"_a, "x"_a, "y"_a, "loops"_a, "offsets"_a, "table"_a, "origin"_a, "step"_a,
+      "bends"_a, "lengths"_a, "per_metre"_a, ReleaseGil());
 }
 
 }  // namespace pushplan::bindings

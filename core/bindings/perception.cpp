@@ -16,8 +16,7 @@ void bind_perception(nb::module_& module) {
         require_room("lengths", lengths.shape(0), 1);
         cast_rays(view(lengths), {x, y, heading}, polygons(vertices, offsets));
       },
-      "lengths"_a.noconvert(), "x"_a, "y"_a, "heading"_a, "vertices"_a.noconvert(),
-      "offsets"_a.noconvert(), ReleaseGil());
+      "lengths"_a, "x"_a, "y"_a, "heading"_a, "vertices"_a, "offsets"_a, ReleaseGil());
   module.def(
       "mark_scan",
       [](const FloatsOut<2>& values, double corner_x, double corner_y, double side, double x,
@@ -30,13 +29,12 @@ void bind_perception(nb::module_& module) {
         if (!(side > 0.0)) refuse("side", std::to_string(side), "positive");
         const std::span<const double> odds = view(evidence);
         const CellWindow window =
-            mark_scan({view(values), {corner_x, corner_y}, side}, {x, y}, view(bearings), view(passed),
-                      view(hits), {odds[0], odds[1], odds[2], odds[3], averaged});
+            mark_scan({view(values), {corner_x, corner_y}, side}, {x, y}, view(bearings),
+                      view(passed), view(hits), {odds[0], odds[1], odds[2], odds[3], averaged});
         return std::tuple{window.row, window.column, window.end_row, window.end_column};
       },
-      "values"_a.noconvert(), "corner_x"_a, "corner_y"_a, "side"_a, "x"_a, "y"_a,
-      "bearings"_a.noconvert(), "passed"_a.noconvert(), "hits"_a.noconvert(), "evidence"_a.noconvert(),
-      "averaged"_a, ReleaseGil());
+      "values"_a, "corner_x"_a, "corner_y"_a, "side"_a, "x"_a, "y"_a, "bearings"_a, "passed"_a,
+      "hits"_a, "evidence"_a, "averaged"_a, ReleaseGil());
 }
 
 }  // namespace pushplan::bindings

@@ -18,11 +18,11 @@ namespace {
 
 /// A state as Python has it: robot pose, offset, angle, gap.
 using OneState = Numbers<6>;
-using States = nb::ndarray<double, nb::shape<-1, 6>, nb::c_contig, nb::device::cpu>;
+using States = Exact<double, nb::shape<-1, 6>>;
 /// Motions of a box as Python has them, the number of the mode fifth.
-using Motions = nb::ndarray<double, nb::shape<-1, 6>, nb::c_contig, nb::device::cpu>;
+using Motions = Exact<double, nb::shape<-1, 6>>;
 
-using Slopes = nb::ndarray<double, nb::shape<2, 4>, nb::c_contig, nb::device::cpu>;
+using Slopes = Exact<double, nb::shape<2, 4>>;
 
 constexpr Index kMostSteps = 1000;  // of a program, whose P is dense
 
@@ -44,14 +44,8 @@ void write(const BoxMotion& motion, double* out) {
 
 void bind_contact(nb::module_& module) {
   nb::class_<BoxContact>(module, "BoxContact", "Bumper and pushed face.")
-      .def(
-          "__init__",
-          [](BoxContact* self, double front, double half, double curvature, double depth,
-             double low, double high, double spread, double friction) {
-            new (self) BoxContact{front, half, curvature, depth, low, high, spread, friction};
-          },
-          "front"_a, "half"_a, "curvature"_a, "depth"_a, "low"_a, "high"_a, "spread"_a,
-          "friction"_a)
+      .def(nb::init<double, double, double, double, double, double, double, double>(), "front"_a,
+           "half"_a, "curvature"_a, "depth"_a, "low"_a, "high"_a, "spread"_a, "friction"_a)
       .def_prop_ro("numbers",
                    [](const BoxContact& self) {
                      return std::tuple(self.front, self.half, self.curvature, self.depth, self.low,
@@ -87,7 +81,7 @@ void bind_contact(nb::module_& module) {
             write(motion, out.data());
             return x;
           },
-          "offset"_a, "angle"_a, "c"_a, "s"_a, "v"_a, "w"_a, "dt"_a, "out"_a.noconvert())
+          "offset"_a, "angle"_a, "c"_a, "s"_a, "v"_a, "w"_a, "dt"_a, "out"_a)
       .def(
           "linearise",
           [](const BoxContact& self, double offset, double angle, double v, double w, double dt,
@@ -98,8 +92,7 @@ void bind_contact(nb::module_& module) {
             std::ranges::copy(found.offset, slopes.data());
             std::ranges::copy(found.angle, slopes.data() + found.offset.size());
           },
-          "offset"_a, "angle"_a, "v"_a, "w"_a, "dt"_a, "widths"_a.noconvert(),
-          "slopes"_a.noconvert())
+          "offset"_a, "angle"_a, "v"_a, "w"_a, "dt"_a, "widths"_a, "slopes"_a)
       .def(
           "roll_out",
           [](const BoxContact& self, const OneState& start, const Floats<2>& twists,
@@ -112,14 +105,13 @@ void bind_contact(nb::module_& module) {
                      rows_as<PushState>(states), found);
             for (std::size_t k = 0; k < found.size(); ++k) write(found[k], motions.data() + 6 * k);
           },
-          "start"_a.noconvert(), "twists"_a.noconvert(), "steps"_a.noconvert(),
-          "states"_a.noconvert(), "motions"_a.noconvert(), ReleaseGil())
+          "start"_a, "twists"_a, "steps"_a, "states"_a, "motions"_a, ReleaseGil())
       .def(
           "observe",
           [](const BoxContact& self, double normal, const OnePose& robot, const OnePose& box) {
             return copied_state(observe(self, normal, pose(robot), pose(box)));
           },
-          "normal"_a, "robot"_a.noconvert(), "box"_a.noconvert(), kOwned)
+          "normal"_a, "robot"_a, "box"_a, kOwned)
       .def(
           "box_pose",
           [](const BoxContact& self, const OneState& state) {
@@ -127,7 +119,7 @@ void bind_contact(nb::module_& module) {
             const double numbers[]{box.x, box.y, box.theta};
             return copied(std::span<const double>(numbers));
           },
-          "state"_a.noconvert(), kOwned);
+          "state"_a, kOwned);
 }
 
 void bind_clearance(nb::module_& module) {
@@ -141,8 +133,7 @@ void bind_clearance(nb::module_& module) {
             require_count("radii", radii.shape(0), parts.count());
             new (self) Clearance(parts, view(radii), {least, slack});
           },
-          "vertices"_a.noconvert(), "offsets"_a.noconvert(), "radii"_a.noconvert(), "least"_a,
-          "slack"_a)
+          "vertices"_a, "offsets"_a, "radii"_a, "least"_a, "slack"_a)
       .def(
           "gaps",
           [](Clearance& self, const BoxContact& contact, double normal, const OneState& state,
@@ -150,22 +141,15 @@ void bind_clearance(nb::module_& module) {
             const auto [robot, box] = self.gaps(contact, normal, state_of(state), obstacles);
             return std::pair{robot, box};
           },
-          "contact"_a, "normal"_a, "state"_a.noconvert(), "obstacles"_a, ReleaseGil());
+          "contact"_a, "normal"_a, "state"_a, "obstacles"_a, ReleaseGil());
 }
 
 void bind_problem(nb::module_& module) {
   nb::class_<PushWeights>(module, "PushWeights", "Costs and scales of the cost.")
-      .def(
-          "__init__",
-          [](PushWeights* self, double length, double max_speed, double half, double curvature,
-             double heading, double offset, double rim, double safe, double angle, double grip,
-             double turn, double speed, double smoothness, double terminal) {
-            new (self)
-                PushWeights{length, max_speed, half, curvature, heading, offset,     rim,
-                            safe,   angle,     grip, turn,      speed,   smoothness, terminal};
-          },
-          "length"_a, "max_speed"_a, "half"_a, "curvature"_a, "heading"_a, "offset"_a, "rim"_a,
-          "safe"_a, "angle"_a, "grip"_a, "turn"_a, "speed"_a, "smoothness"_a, "terminal"_a);
+      .def(nb::init<double, double, double, double, double, double, double, double, double, double,
+                    double, double, double, double>(),
+           "length"_a, "max_speed"_a, "half"_a, "curvature"_a, "heading"_a, "offset"_a, "rim"_a,
+           "safe"_a, "angle"_a, "grip"_a, "turn"_a, "speed"_a, "smoothness"_a, "terminal"_a);
   nb::class_<PushingProblem>(module, "PushingProblem", "The pushing problem of one call.")
       .def(
           "__init__",
@@ -184,10 +168,8 @@ void bind_problem(nb::module_& module) {
                                       view(steps),
                                       view(groups)};
           },
-          "contact"_a, "track"_a, "weights"_a, "start"_a.noconvert(), "along"_a,
-          "last"_a.noconvert(), "units"_a.noconvert(), "steps"_a.noconvert(),
-          "groups"_a.noconvert(), nb::keep_alive<1, 3>(), nb::keep_alive<1, 9>(),
-          nb::keep_alive<1, 10>());
+          "contact"_a, "track"_a, "weights"_a, "start"_a, "along"_a, "last"_a, "units"_a, "steps"_a,
+          "groups"_a, nb::keep_alive<1, 3>(), nb::keep_alive<1, 9>(), nb::keep_alive<1, 10>());
   nb::class_<PushAssembly>(module, "PushAssembly", "Puts up pushing problems of one size.")
       .def(nb::init<Index, Index>(), "steps"_a, "commands"_a)
       .def(
@@ -197,8 +179,7 @@ void bind_problem(nb::module_& module) {
             return self.assemble(problem, rows_as<const Twist>(nominal), view(hessian),
                                  view(gradient));
           },
-          "problem"_a, "nominal"_a.noconvert(), "hessian"_a.noconvert(), "gradient"_a.noconvert(),
-          ReleaseGil());
+          "problem"_a, "nominal"_a, "hessian"_a, "gradient"_a, ReleaseGil());
 }
 
 void bind_tracker(nb::module_& module) {
@@ -210,7 +191,7 @@ void bind_tracker(nb::module_& module) {
             const double* numbers = score.data();
             new (self) Face{{numbers[0], numbers[1], numbers[2]}, contact, normal, curvature};
           },
-          "score"_a.noconvert(), "contact"_a, "normal"_a, "curvature"_a);
+          "score"_a, "contact"_a, "normal"_a, "curvature"_a);
   nb::class_<PushTracker>(module, "PushTracker", "Pushes boxes along paths.")
       .def(
           "__init__",
@@ -224,12 +205,12 @@ void bind_tracker(nb::module_& module) {
               require_between("groups", listed[k], listed[k - 1], listed[k - 1] + 1);
             }
             require_between("groups", listed.back(), 1, kMostSteps);
-            new (self) PushTracker(
-                limits, {weights, {listed.begin(), listed.end()}, reach, delay, gain}, solver,
-                {v, w});
+            new (self)
+                PushTracker(limits, {weights, {listed.begin(), listed.end()}, reach, delay, gain},
+                            solver, {v, w});
           },
-          "limits"_a, "weights"_a, "solver"_a, "groups"_a.noconvert(), "reach"_a, "delay"_a,
-          "gain"_a, "v"_a, "w"_a)
+          "limits"_a, "weights"_a, "solver"_a, "groups"_a, "reach"_a, "delay"_a, "gain"_a, "v"_a,
+          "w"_a)
       .def(
           "begin",
           [](PushTracker& self, std::vector<Face> faces, const Clearance& clearance,
@@ -242,12 +223,13 @@ void bind_tracker(nb::module_& module) {
           "follow",
           [](PushTracker& self, const mpc::ReferencePath& track, const Obstacles& obstacles,
              const OnePose& robot, const OnePose& box, double time, double held) {
-            if (!self.has_begun()) throw Refusal("begin a path before it is followed");
+            if (!self.has_begun())
+              throw std::invalid_argument("begin a path before it is followed");
             const Twist twist = self.follow(track, obstacles, pose(robot), pose(box), time, held);
             return std::pair{twist.v, twist.w};
           },
-          "track"_a, "obstacles"_a, "robot"_a.noconvert(), "box"_a.noconvert(), "time"_a, "held"_a,
-          ReleaseGil(), "The command; a stop at the end, and for poses that are not finite.")
+          "track"_a, "obstacles"_a, "robot"_a, "box"_a, "time"_a, "held"_a, ReleaseGil(),
+          "The command; a stop at the end, and for poses that are not finite.")
       .def(
           "stop",
           [](PushTracker& self, double time, double held) {

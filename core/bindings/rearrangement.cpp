@@ -92,8 +92,8 @@ void bind_goal(nb::module_& module) {
             new (self)
                 ObjectGoal{points(polygon), rows_as<const GoalEdge>(edges), is_receptacle, slack};
           },
-          "polygon"_a.noconvert(), "edges"_a.noconvert(), "is_receptacle"_a, "slack"_a,
-          nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>());
+          "polygon"_a, "edges"_a, "is_receptacle"_a, "slack"_a, nb::keep_alive<1, 2>(),
+          nb::keep_alive<1, 3>());
   module.def(
       "all_done",
       [](const Poses& objects, const Bodies& bodies, const ObjectGoal& goal) {
@@ -103,8 +103,7 @@ void bind_goal(nb::module_& module) {
             [&] { GoalTest(bodies.shapes, goal).all_done(poses(objects), done.numbers()); });
         return done.give();
       },
-      "poses"_a.noconvert(), "bodies"_a, "goal"_a, kOwned,
-      "(K,) whether each object is where it belongs.");
+      "poses"_a, "bodies"_a, "goal"_a, kOwned, "(K,) whether each object is where it belongs.");
   module.def(
       "cost_to_go",
       [](const Floats<2>& costs, const Integers<1>& delivers, Index objects) {
@@ -120,7 +119,7 @@ void bind_goal(nb::module_& module) {
         });
         return std::pair(best.give(), following.give());
       },
-      "costs"_a.noconvert(), "delivers"_a.noconvert(), "objects"_a,
+      "costs"_a, "delivers"_a, "objects"_a,
       "(2^objects, N + 1) cost of delivering the rest, and the push to follow or -1, by what is "
       "delivered and the last push; N for none.");
   module.attr("MAX_OBJECTS") = kMaxObjects;
@@ -196,7 +195,7 @@ void bind_grid(nb::module_& module) {
             const PoseCosts found = near_poses(self.grid, pose(at), reach);
             return std::pair(copied(std::span(found.nodes)), copied(std::span(found.costs)));
           },
-          "pose"_a.noconvert(), "reach"_a,
+          "pose"_a, "reach"_a,
           "Flat indices of free poses within `reach` cells, and the cost of going there [m].")
       .def(
           "contact_depths",
@@ -205,13 +204,13 @@ void bind_grid(nb::module_& module) {
             require_objects(objects, bodies);
             const PoseGrid& grid = self.grid;
             OwnedArray<float, 4> out({extent(objects, 0), static_cast<Index>(kHeadingCount),
-                                    grid.rows(), grid.columns()});
+                                      grid.rows(), grid.columns()});
             without_gil([&] {
               contact_depths(grid, shape, poses(objects), bodies.objects, bodies.radii, out.view());
             });
             return out.give();
           },
-          "shape"_a, "poses"_a.noconvert(), "bodies"_a, kOwned,
+          "shape"_a, "poses"_a, "bodies"_a, kOwned,
           "(K, 16, rows, columns) depth of the footprint in each object [m].")
       .def(
           "search",
@@ -238,21 +237,20 @@ void bind_grid(nb::module_& module) {
             });
             return std::pair(costs.give(), before.give());
           },
-          "starts"_a.noconvert(), "start_costs"_a.noconvert(), "depths"_a.noconvert(),
-          "touch"_a.noconvert(), "turn_cost"_a, "arm"_a, "targets"_a.noconvert(),
+          "starts"_a, "start_costs"_a, "depths"_a, "touch"_a, "turn_cost"_a, "arm"_a, "targets"_a,
           "Cost of each pose [m], and the pose before it, -1 for none. Ends with the last target.");
   module.def(
       "add_layers",
       [](const Array<const float, 4>& layers, const Floats<1>& weights) {
         require_count("weights", weights.shape(0), layers.shape(0));
         const OwnedArray<double, 3>::Shape shape{extent(layers, 1), extent(layers, 2),
-                                               extent(layers, 3)};
+                                                 extent(layers, 3)};
         OwnedArray<double, 3> depth(shape);
         OwnedArray<double, 3> touch(shape);
         without_gil([&] { add_layers(view(layers), view(weights), depth.view(), touch.view()); });
         return std::pair(depth.give(), touch.give());
       },
-      "layers"_a.noconvert(), "weights"_a.noconvert(),
+      "layers"_a, "weights"_a,
       "Depth in all objects of weight at each pose [m], and the weights of those it is in.");
   module.def(
       "least_costs",
@@ -265,8 +263,8 @@ void bind_grid(nb::module_& module) {
         least_costs(view(costs), {view(nodes), view(extra), view(ends)}, out.numbers());
         return out.give();
       },
-      "costs"_a.noconvert(), "nodes"_a.noconvert(), "extra"_a.noconvert(), "ends"_a.noconvert(),
-      kOwned, "(N,) cost of getting to places, each by those of the poses that end there [m].");
+      "costs"_a, "nodes"_a, "extra"_a, "ends"_a, kOwned,
+      "(N,) cost of getting to places, each by those of the poses that end there [m].");
 }
 
 void bind_poses(nb::module_& module) {
@@ -278,7 +276,7 @@ void bind_poses(nb::module_& module) {
         *out.as<Pose>() = pose_behind(pose(object), points(outline), heading, shift, distance);
         return out.give();
       },
-      "pose"_a.noconvert(), "outline"_a.noconvert(), "heading"_a, "shift"_a, "distance"_a, kOwned);
+      "pose"_a, "outline"_a, "heading"_a, "shift"_a, "distance"_a, kOwned);
   module.def(
       "pushable_moves",
       [](const Floats<3>& middles, const Array<const bool, 2>& is_open, const Floats<1>& shifts,
@@ -294,8 +292,7 @@ void bind_poses(nb::module_& module) {
         });
         return out.give();
       },
-      "middles"_a.noconvert(), "is_open"_a.noconvert(), "shifts"_a.noconvert(), "distance"_a,
-      "shape"_a, "among"_a, kOwned,
+      "middles"_a, "is_open"_a, "shifts"_a, "distance"_a, "shape"_a, "among"_a, kOwned,
       "(16, rows, columns) whether the robot fits behind an object to push it along each heading.");
   module.def(
       "push_costs",
@@ -313,8 +310,7 @@ void bind_poses(nb::module_& module) {
         });
         return out.give();
       },
-      "is_open"_a.noconvert(), "pushable"_a.noconvert(), "goals"_a.noconvert(), "step"_a,
-      "drag_cost"_a, kOwned,
+      "is_open"_a, "pushable"_a, "goals"_a, "step"_a, "drag_cost"_a, kOwned,
       "(rows, columns) cost of the cheapest path of an object from each cell to a goal [m].");
   nb::class_<RouteSearch>(module, "RouteSearch",
                           "Costs of motions among objects and walls, with memory for one thread.")
@@ -328,10 +324,9 @@ void bind_poses(nb::module_& module) {
             new (self) RouteSearch({step, turn_cost, arm}, shape, tight, among,
                                    {poses(objects), bodies.objects, bodies.radii, view(weights)});
           },
-          "step"_a, "turn_cost"_a, "arm"_a, "shape"_a, "tight"_a, "among"_a, "poses"_a.noconvert(),
-          "bodies"_a, "weights"_a.noconvert(), nb::keep_alive<1, 5>(), nb::keep_alive<1, 6>(),
-          nb::keep_alive<1, 7>(), nb::keep_alive<1, 8>(), nb::keep_alive<1, 9>(),
-          nb::keep_alive<1, 10>())
+          "step"_a, "turn_cost"_a, "arm"_a, "shape"_a, "tight"_a, "among"_a, "poses"_a, "bodies"_a,
+          "weights"_a, nb::keep_alive<1, 5>(), nb::keep_alive<1, 6>(), nb::keep_alive<1, 7>(),
+          nb::keep_alive<1, 8>(), nb::keep_alive<1, 9>(), nb::keep_alive<1, 10>())
       .def(
           "cheapest_legs",
           [](RouteSearch& self, const Points& line, double heading, double end, Index first,
@@ -345,7 +340,7 @@ void bind_poses(nb::module_& module) {
                               copied(std::span(legs.before)),
                               copied_rows<double>(std::span(legs.turns)));
           },
-          "points"_a.noconvert(), "heading"_a, "end"_a, "first"_a, "longest"_a,
+          "points"_a, "heading"_a, "end"_a, "first"_a, "longest"_a,
           "Costs of ending ahead and back; the row before each row (2 i, 2 i + 1); (2 N, 2) turns "
           "before and after.");
 }
@@ -355,17 +350,12 @@ constexpr Index kMostPoses = 10'000'000;  // of the robot
 void bind_pushes(nb::module_& module) {
   nb::class_<PushingController>(module, "PushingController",
                                 "Parameters of the geometric pushing controller.")
-      .def(
-          "__init__",
-          [](PushingController* self, double step, double turn, double size, double half_width,
-             double front, double ahead, double gain) {
-            new (self) PushingController{step, turn, size, half_width, front, ahead, gain};
-          },
-          "step"_a, "turn"_a, "size"_a, "half"_a, "front"_a, "ahead"_a, "gain"_a)
+      .def(nb::init<double, double, double, double, double, double, double>(), "step"_a, "turn"_a,
+           "size"_a, "half"_a, "front"_a, "ahead"_a, "gain"_a)
       .def_prop_ro("numbers",
                    [](const PushingController& self) {
-                     return std::tuple(self.step, self.turn, self.size, self.half_width,
-                                       self.front, self.ahead, self.gain);
+                     return std::tuple(self.step, self.turn, self.size, self.half_width, self.front,
+                                       self.ahead, self.gain);
                    })
       .def_ro("step", &PushingController::step, "Distance between two commands [m].")
       .def_ro("turn", &PushingController::turn, "Greatest turn in one step [rad].")
@@ -383,7 +373,7 @@ void bind_pushes(nb::module_& module) {
           [](const PushingController& self, const OnePose& robot, const OnePose& object) {
             return self.on_bumper(pose(robot), pose(object));
           },
-          "robot"_a.noconvert(), "target"_a.noconvert())
+          "robot"_a, "target"_a)
       .def(
           "steer_push",
           [](const PushingController& self, const OnePose& robot, const OnePose& object,
@@ -392,8 +382,7 @@ void bind_pushes(nb::module_& module) {
                 steer_push(pose(robot), pose(object), path_of(path), reached, shift, self);
             return std::tuple(command.step, command.turn, command.reached, command.holds);
           },
-          "robot"_a.noconvert(), "target"_a.noconvert(), "path"_a.noconvert(), "reached"_a,
-          "shift"_a,
+          "robot"_a, "target"_a, "path"_a, "reached"_a, "shift"_a,
           "Step [m], turn [rad], arc length now [m], and whether the object is on the bumper.");
   module.def(
       "along_path",
@@ -401,7 +390,7 @@ void bind_pushes(nb::module_& module) {
         const Carrot carrot = along_path({x, y}, path_of(path), reached, ahead);
         return std::tuple(carrot.point.x, carrot.point.y, carrot.reached, carrot.distance);
       },
-      "x"_a, "y"_a, "path"_a.noconvert(), "reached"_a, "ahead"_a,
+      "x"_a, "y"_a, "path"_a, "reached"_a, "ahead"_a,
       "The point to head for, the arc length of the nearest one, and the distance to that [m].");
 
   nb::class_<PushRollout>(module, "PushRollout", "Rollouts of pushes, with memory for one thread.")
@@ -447,8 +436,8 @@ void bind_pushes(nb::module_& module) {
                               steps.give(size.stages), stages.give(size.stages),
                               lengths.give(size.stages), box.give());
           },
-          "start"_a.noconvert(), "poses"_a.noconvert(), "target"_a, "path"_a.noconvert(), "shift"_a,
-          "limit"_a, "wanted"_a.noconvert(), "controller"_a, "longest"_a,
+          "start"_a, "poses"_a, "target"_a, "path"_a, "shift"_a, "limit"_a, "wanted"_a,
+          "controller"_a, "longest"_a,
           "(T, 3) poses of the robot, at most `longest`; (S,) how many of them each stage has; "
           "(S, K, 3) the objects and (S, K) their path lengths at its end [m]; (4,) the box around "
           "all that moved and its surroundings [m].");
@@ -471,8 +460,7 @@ void bind_pushes(nb::module_& module) {
         return std::tuple(tracks.give(), out.give(),
                           copied_rows<Index>(std::span<const ArcSweep::Mark>(sweep.marks)));
       },
-      "model"_a, "start"_a.noconvert(), "poses"_a.noconvert(), "arcs"_a.noconvert(), "steps"_a,
-      "target"_a, "size"_a, "least"_a,
+      "model"_a, "start"_a, "poses"_a, "arcs"_a, "steps"_a, "target"_a, "size"_a, "least"_a,
       "(A, steps + 1, 3) poses of the robot along arcs, (A, steps + 1, K, 3) of the objects, and "
       "(N, 2) the arcs and steps at which the target has moved on. What lies beyond the last of "
       "them on an arc is not defined.");

@@ -46,8 +46,8 @@ void bind_scenarios(nb::module_& module) {
             const double* b = box.data();
             new (self) IceWater{b[0], b[1], b[2], b[3], polygons(blocks, block_offsets), gap};
           },
-          "box"_a.noconvert(), "blocks"_a.noconvert(), "block_offsets"_a.noconvert(), "gap"_a,
-          nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>())
+          "box"_a, "blocks"_a, "block_offsets"_a, "gap"_a, nb::keep_alive<1, 3>(),
+          nb::keep_alive<1, 4>())
       .def_ro("gap", &IceWater::gap, "Least distance between floes, and to the regions [m].");
 
   module.def(
@@ -71,8 +71,7 @@ void bind_scenarios(nb::module_& module) {
         }
         return cells.arrays();
       },
-      "centres"_a.noconvert(), "radii"_a.noconvert(), "reaches"_a.noconvert(),
-      "neighbours"_a.noconvert(), "neighbour_offsets"_a.noconvert(), "water"_a,
+      "centres"_a, "radii"_a, "reaches"_a, "neighbours"_a, "neighbour_offsets"_a, "water"_a,
       "Cells of a power diagram (Laguerre tessellation), half a gap smaller on every side: corners "
       "in rows of equal length, and how many of each row are in use.");
 
@@ -93,8 +92,8 @@ void bind_scenarios(nb::module_& module) {
         }
         return floes.arrays();
       },
-      "shapes"_a.noconvert(), "shape_counts"_a.noconvert(), "centres"_a.noconvert(),
-      "cells"_a.noconvert(), "cell_counts"_a.noconvert(), "targets"_a.noconvert(), "stretch"_a,
+      "shapes"_a, "shape_counts"_a, "centres"_a, "cells"_a, "cell_counts"_a, "targets"_a,
+      "stretch"_a,
       "Shapes of area 1 grown within their cells until they have their target areas, or cannot "
       "grow further.");
 
@@ -114,7 +113,7 @@ void bind_scenarios(nb::module_& module) {
         }
         return copied_rows<double>(std::span<const Vec2>(centres));
       },
-      "radii"_a.noconvert(), "draws"_a.noconvert(), "density"_a.noconvert(), "water"_a,
+      "radii"_a, "draws"_a, "density"_a, "water"_a,
       "(J, 2) centres of the first J discs, largest first, which found a place.");
 }
 

@@ -82,7 +82,7 @@ void bind_search(nb::module_& module) {
             require_indices("starts", view(starts), view(weights).size());
             new (self) GridDijkstra(view(weights), cell, view(starts));
           },
-          "weights"_a.noconvert(), "cell"_a, "starts"_a.noconvert(), nb::keep_alive<1, 2>())
+          "weights"_a, "cell"_a, "starts"_a, nb::keep_alive<1, 2>())
       .def(
           "settle",
           [](GridDijkstra& self, const Array<const bool, 2>& goals, Index upto) {
@@ -90,19 +90,15 @@ void bind_search(nb::module_& module) {
             require_count("columns of goals", goals.shape(1), self.costs().extent(1));
             return self.settle(view(goals), upto);
           },
-          "goals"_a.noconvert(), "upto"_a, ReleaseGil())
+          "goals"_a, "upto"_a, ReleaseGil())
       .def_prop_ro(
           "costs",
           [](const GridDijkstra& self) {
             const auto costs = self.costs();
-            auto* owned = new std::vector<double>(costs.data(), costs.data() + costs.size());
-            nb::capsule owner(
-                owned, [](void* p) noexcept { delete static_cast<std::vector<double>*>(p); });
-            return nb::ndarray<nb::numpy, double, nb::ndim<2>>(
-                owned->data(),
-                {static_cast<std::size_t>(costs.extent(0)),
-                 static_cast<std::size_t>(costs.extent(1))},
-                owner);
+            const auto copy = zeros<double, 2>({static_cast<std::size_t>(costs.extent(0)),
+                                                static_cast<std::size_t>(costs.extent(1))});
+            std::copy_n(costs.data(), costs.size(), copy.data());
+            return copy;
           },
           kOwned)
       .def_prop_ro(

@@ -11,6 +11,7 @@
 #include "pushplan/geometry/polygon.hpp"
 #include "pushplan/geometry/raster.hpp"
 #include "pushplan/geometry/regions.hpp"
+#include "pushplan/geometry/shortest_path.hpp"
 #include "shapes.hpp"
 
 namespace pushplan {
@@ -57,6 +58,7 @@ void measures_are_those_of_rectangles() {
     CHECK(near_to(polygon_area(corners), w * h));
     CHECK(near_to(centroid.x, middle.x) && near_to(centroid.y, middle.y));
     CHECK(near_to(polygon_inertia(corners), (w * w + h * h) / 12.0));
+    CHECK(near_to(least_width(corners), std::min(w, h)));
     CHECK(std::abs(wrap_angle(pose.theta + 20.0)) <= std::numbers::pi);
   }
 }
@@ -140,6 +142,57 @@ void nearest_points_are_in_their_regions() {
   CHECK(crossing.size() == 1 && near_to(crossing[0].x, 1.0) && near_to(crossing[0].y, 1.0));
 }
 
+/// Grown outlines hold a disc about each corner and reach little beyond; discs inside grow along.
+void grown_outlines_hold_all_within_the_margin() {
+  Xorshift64Star random(5);
+  for (int trial = 0; trial < 300; ++trial) {
+    const auto corners = convex_shape(random, {0.1, 0.0}, 1.0);
+    const double margin = between(random, 0.01, 2.0);
+    const auto grown = grown_outline(corners, margin);
+    for (const Vec2 corner : corners) CHECK(core_distance(corner, grown) <= 1e-9 - margin);
+    for (const Vec2 corner : grown) {
+      const double away = core_distance(corner, corners);
+      CHECK(away >= margin - 1e-9 && away <= 1.56 * margin);
+    }
+    const double inside = inscribed_radius(corners);
+    CHECK(near_to(inside, std::max(0.0, -core_distance({0.0, 0.0}, corners))));
+    if (inside > 0.0) CHECK(near_to(inscribed_radius(grown), inside + margin));
+    CHECK(grown_outline(corners, 0.0).size() == corners.size());
+  }
+}
+
+/// A search and the distances from all bends agree, with a line to pass and a start at a wall.
+void shortest_paths_go_around_walls() {
+  OwnPolygons blocks;
+  blocks.add(rectangle(4.0, 0.0, 5.0, 6.0));
+  const StaticMap map(blocks, {{{{7.0, 4.0}, {7.0, 10.0}}, 0.1}}, {0.0, 0.0, 10.0, 10.0});
+  const GoalRegion disc{GoalRegion::Kind::kDisc, {9.0, 5.0}, {}, 0.5};
+  const GoalRegion line{GoalRegion::Kind::kLine, {8.0, 0.0}, {1.0, 0.0}};
+  for (const GoalRegion& goal : {disc, line}) {
+    for (const Vec2 start : {Vec2{1.0, 2.0}, Vec2{3.9, 1.0}, Vec2{4.5, 3.0}}) {
+      ShortestPath search(map, 0.2, start, regions_of(goal));
+      while (!search.run()) {
+      }
+      const Route route = GoalDistances(map, 0.2, regions_of(goal)).path_from(start);
+      CHECK(search.map().keeps_clearance(start) == (start.x < 3.9));
+      CHECK(search.points().size() == route.points.size());
+      if (start.x == 4.5) {
+        CHECK(std::isinf(search.length()) && std::isinf(route.length));
+        continue;
+      }
+      CHECK(near_to(search.length(), route.length, 1e-6));
+      double length = 0.0;
+      for (std::size_t i = 1; i < route.points.size(); ++i) {
+        const Vec2 a = search.points()[i - 1];
+        const Vec2 b = search.points()[i];
+        length += std::hypot(b.x - a.x, b.y - a.y);
+      }
+      CHECK(near_to(length, search.length()) && length > 8.0);
+      CHECK(goal.distance(search.points().back()) < 1e-6);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace pushplan
 
@@ -149,5 +202,7 @@ int main() {
   pushplan::sight_keeps_its_margin();
   pushplan::pixels_are_set_by_their_centres();
   pushplan::nearest_points_are_in_their_regions();
+  pushplan::grown_outlines_hold_all_within_the_margin();
+  pushplan::shortest_paths_go_around_walls();
   return pushplan::tests::finish();
 }

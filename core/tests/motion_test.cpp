@@ -5,11 +5,19 @@
 
 #include "check.hpp"
 #include "pushplan/geometry/convex.hpp"
+#include "pushplan/motion/coarse_path.hpp"
 #include "pushplan/motion/collision.hpp"
 #include "pushplan/motion/dubins.hpp"
+#include "pushplan/motion/footprint.hpp"
+#include "pushplan/motion/goal_approach.hpp"
+#include "pushplan/motion/goal_region.hpp"
+#include "pushplan/motion/keep_out.hpp"
+#include "pushplan/motion/random_tree/path_tree.hpp"
+#include "pushplan/motion/length_bound.hpp"
 #include "pushplan/motion/random_tree/steering.hpp"
 #include "pushplan/motion/reeds_shepp.hpp"
 #include "pushplan/motion/room_ahead.hpp"
+#include "pushplan/motion/speed_profile.hpp"
 #include "pushplan/motion/state_lattice/cost_map.hpp"
 #include "pushplan/motion/state_lattice/primitives.hpp"
 #include "pushplan/motion/state_lattice/swaths.hpp"
@@ -144,29 +152,94 @@ void checks_find_every_overlap() {
   CHECK(free > 100 && free < 1400);
 }
 
+/// Arcs of a tree that grows through a room with a door; empty if it misses the goal.
+std::vector<Arc> tree_arcs(const Pose& root, const GoalRegion& goal, const Footprint& footprint,
+                           const ConvexObstacles& walls, std::uint64_t seed) {
+  const std::vector<Vec2> coarse{{-3.0, -3.0}, {0.0, 0.0}, {0.5, 0.0}, {3.0, 3.0}};
+  Random random(seed);
+  TreeTargets targets(coarse, 0.8, 0.3, walls.bounds, random);
+  PathTree tree(root, goal, {2.0, 0.8, 0.05, 0.2}, 0.5, footprint, walls);
+  for (int i = 0; i < 20'000; ++i) {
+    const Pose target = targets.draw();
+    if (tree.grow(target, 2.0 * (2.0 * random.uniform() - 1.0))) return tree.arcs();
+  }
+  CHECK(tree.count() > 1);
+  return {};
+}
+
+/// A tree finds the door of a room, by arcs that are free and the same from the same seed.
+void trees_find_doors() {
+  const Walls walls(Shapes({rectangle(-0.1, -6.0, 0.1, -0.6), rectangle(-0.1, 0.6, 0.1, 6.0)}));
+  const Shapes robot({rectangle(-0.25, -0.15, 0.25, 0.15)});
+  const Footprint footprint{robot.polygons(), 0.3};
+  CollisionChecker checker(footprint, walls.obstacles());
+  const Pose root{-3.0, -3.0, 4.0};
+  const GoalRegion goal{GoalRegion::Kind::kDisc, {3.0, 3.0}, {}, 0.3};
+  for (std::uint64_t seed = 0; seed < 5; ++seed) {
+    const std::vector<Arc> arcs = tree_arcs(root, goal, footprint, walls.obstacles(), seed);
+    Pose at = root;
+    double backward = 0.0;
+    for (const Arc& arc : arcs) {
+      for (int part = 1; part <= 4; ++part) {
+        CHECK(checker.is_free(along_arc(at, {0.25 * part * arc.length, arc.curvature})));
+      }
+      backward -= std::min(arc.length, 0.0);
+      at = along_arc(at, arc);
+    }
+    CHECK(goal.contains({at.x, at.y}) && backward <= 0.5 + 1e-12);
+    const auto same = [](const Arc& a, const Arc& b) {
+      return a.length == b.length && a.curvature == b.curvature;
+    };
+    CHECK(
+        std::ranges::equal(arcs, tree_arcs(root, goal, footprint, walls.obstacles(), seed), same));
+    const auto others = tree_arcs(root, goal, footprint, walls.obstacles(), seed + 1);
+    CHECK(!std::ranges::equal(arcs, others, same));
+  }
+}
+
+/// Normal deviates have a mean of 0 and a variance of 1, whatever the seed.
+void deviates_are_normal() {
+  for (const std::uint64_t seed : {0ULL, 1ULL, ~0ULL}) {
+    Random random(seed);
+    double sum = 0.0;
+    double squares = 0.0;
+    for (int i = 0; i < 10'000; ++i) {
+      const double deviate = random.normal();
+      sum += deviate;
+      squares += deviate * deviate;
+    }
+    CHECK(near_to(sum / 1e4, 0.0, 0.04) && near_to(squares / 1e4, 1.0, 0.06));
+  }
+}
+
 /// A robot in a closed box gets away by no drive, and through a gap by one that is free.
 void rooms_are_left_by_their_gaps() {
-  const std::array<Arc, 3> moves{{{0.2, 0.0}, {0.2, 2.0}, {0.2, -2.0}}};
   const Shapes robot({rectangle(-0.2, -0.15, 0.2, 0.15)});
+  const Pose start{-0.2, 0.0, 0.0};
+  constexpr double kSize = 0.25;
   for (const bool closed : {true, false}) {
-    Shapes shapes({rectangle(-1.2, -1.2, 1.2, -1.0), rectangle(-1.2, 1.0, 1.2, 1.2),
-                   rectangle(-1.2, -1.0, -1.0, 1.0)});
-    if (closed) shapes.add(rectangle(1.0, -1.0, 1.2, 1.0));
+    Shapes shapes({rectangle(-0.7, -0.4, 0.1, -0.2), rectangle(-0.7, 0.2, 0.1, 0.4),
+                   rectangle(-0.7, -0.2, -0.5, 0.2)});
+    if (closed) shapes.add(rectangle(0.1, -0.2, 0.3, 0.2));
     const Walls walls(std::move(shapes));
-    const Footprint footprint{robot.polygons(), 0.25};
+    const Footprint footprint{robot.polygons(), kSize};
     const GoalRegion nowhere{GoalRegion::Kind::kDisc, {50.0, 50.0}};
-    RoomExploration search({footprint, walls.obstacles(), nowhere, 0.05}, {moves, 2.0, 0.0, true},
-                           {-0.5, 0.0, 0.0}, {0.1, 0.2, 25, 32}, 20000);
-    const auto outcome = search.run(20000);
-    CHECK(outcome ==
-          (closed ? RoomExploration::Outcome::kClosed : RoomExploration::Outcome::kAway));
-    Pose at{-0.5, 0.0, 0.0};
-    CollisionChecker checker(footprint, walls.obstacles());
-    for (const Arc& arc : search.arcs()) {
-      at = along_arc(at, arc);
-      CHECK(checker.is_free(at));
-    }
-    CHECK(closed ? search.arcs().empty() : at.x > 1.4);
+    const Room room{footprint, walls.obstacles(), nowhere, 0.05};
+    const auto leads_out = [&](RoomExploration search, Pose at) {
+      while (!search.run()) CHECK(!search.away() && !search.closed());
+      CHECK(search.closed() == !search.away() && search.closed() == search.arcs().empty());
+      CollisionChecker checker(footprint, walls.obstacles());
+      for (const Arc& arc : search.arcs()) {
+        at = along_arc(at, arc);
+        CHECK(checker.is_free(at));
+      }
+      return search.away();
+    };
+    CHECK(leads_out(explore_ahead(room, start, kSize, 0.5), start) == !closed);
+    CHECK(leads_out(explore_around({true, false}, room, start, kSize, 0.5), start) == !closed);
+    CHECK(leads_out(explore_to_turn({true, false}, room, start, kSize), start) == !closed);
+    const Pose outside{2.0, 0.0, 0.0};  // it can turn there already
+    CHECK(!leads_out(explore_to_turn({true, false}, room, outside, kSize), outside));
   }
 }
 
@@ -197,14 +270,176 @@ void primitives_join_lattice_points() {
   CHECK((sums == std::array<double, 9>{0.0, 1.0, 5.0, 0.0, 2.0, 7.0, 0.0, 3.0, 9.0}));
 }
 
+std::vector<Vec2> ngon(Vec2 middle, double radius, int corners) {
+  std::vector<Vec2> made;
+  for (int i = 0; i < corners; ++i) {
+    const double angle = 2.0 * std::numbers::pi * i / corners;
+    made.push_back({middle.x + radius * std::cos(angle), middle.y + radius * std::sin(angle)});
+  }
+  return made;
+}
+
+/// Coarse paths go around walls and what is expensive, in pieces; two searches share what they make
+/// of a map.
+void coarse_paths_trade_length_against_weights() {
+  OwnPolygons pillar;
+  pillar.add(ngon({10.0, 10.0}, 3.0, 900));
+  const Box bounds{0.0, 0.0, 20.0, 20.0};
+  const StaticMap map(pillar, {}, bounds);
+  const CoarseRobot robot{0.1, 0.15};
+  const GoalRegion goal{GoalRegion::Kind::kDisc, {16.0, 10.0}, {0.0, 0.0}, 0.01};
+  OwnPolygons boxes;
+  boxes.add(rectangle(8.0, 13.0, 12.0, 20.0));  // above the pillar
+  const std::array weights{1e4};
+  CoarsePath path(map, robot, {4.0, 10.2}, goal, boxes.polygons(), weights);
+  int pieces = 1;
+  while (!path.run()) ++pieces;
+  CHECK(pieces > 20 && path.run());
+  double highest = 0.0;
+  double gap = 9.0;
+  for (const Vec2 p : path.points()) {
+    highest = std::max(highest, p.y);
+    gap = std::min(gap, core_distance(p, map.parts()[0]));
+  }
+  CHECK(highest < 10.5 && gap >= 0.1);
+  CHECK(std::hypot(path.points().back().x - 16.0, path.points().back().y - 10.0) < 0.1);
+
+  const StaticMap shared(pillar, {}, bounds);
+  CoarsePath one(shared, robot, {4.0, 10.2}, goal, boxes.polygons(), weights);
+  CoarsePath other(shared, robot, {4.0, 10.2}, goal, boxes.polygons(), weights);
+  int halves = 1;
+  while (!(one.run() & other.run())) ++halves;
+  CHECK(halves < pieces);
+  for (const CoarsePath* again : {&one, &other}) {
+    CHECK(again->points().size() == path.points().size());
+    for (std::size_t i = 0; i < path.points().size(); ++i) {
+      CHECK(again->points()[i].x == path.points()[i].x);
+      CHECK(again->points()[i].y == path.points()[i].y);
+    }
+  }
+}
+
+/// Only a closed wall seals a goal off, and only where cells are fine enough to tell.
+void sealed_goals_are_known() {
+  const GoalRegion goal{GoalRegion::Kind::kLine, {8.0, 0.0}, {1.0, 0.0}};
+  for (const double door : {0.0, 1.0}) {
+    const StaticMap map({}, {{{{5.0, 0.0}, {5.0, 10.0 - door}}, 0.1}}, {0.0, 0.0, 10.0, 10.0});
+    for (const double inscribed : {0.01, 0.3}) {
+      Reachable search(map, {inscribed, 0.4}, {2.0, 2.0}, goal);
+      while (!search.run()) continue;
+      CHECK(search.is_sealed() == (door == 0.0 && inscribed == 0.3));
+    }
+  }
+}
+
+/// Where the robot does not fit at a goal, tolerances are found around where it does.
+void goals_move_to_where_the_robot_fits() {
+  OwnPolygons footprint;
+  footprint.add(rectangle(-0.2, -0.2, 0.2, 0.2));
+  OwnPolygons post;
+  post.add(rectangle(5.1, 4.0, 6.0, 6.0));
+  const StaticMap map(post, {}, {0.0, 0.0, 10.0, 10.0});
+  GoalRegion goal{GoalRegion::Kind::kDisc, {5.0, 5.0}, {0.0, 0.0}, 0.4, 0.0};
+  const double size = 0.2 * std::numbers::sqrt2;
+  CollisionChecker checker({footprint.polygons(), size}, map.walls());
+  const auto moved = fitting(goal, footprint.polygons(), size, map.walls());
+  CHECK(moved && moved->point.x < 5.0 && moved->radius < 0.4);
+  CHECK(moved && checker.is_free({moved->point.x, moved->point.y, moved->heading}));
+  goal.radius = 0.05;
+  CHECK(!fitting(goal, footprint.polygons(), size, map.walls()));
+  goal.point.x = 4.0;
+  const auto same = fitting(goal, footprint.polygons(), size, map.walls());
+  CHECK(same && same->point.x == 4.0 && same->radius == 0.05);
+}
+
+/// What a robot keeps away from leaves it free; far away it is grown by the whole margin.
+void margins_leave_the_robot_free() {
+  Xorshift64Star random(6);
+  const Box bounds{-5.0, -5.0, 5.0, 5.0};
+  const Shapes robot({rectangle(-0.3, -0.2, 0.3, 0.2)});
+  const double size = radius_of(robot.vertices);
+  for (int trial = 0; trial < 100; ++trial) {
+    OwnPolygons polygons;
+    polygons.add(convex_shape(random, {between(random, -2.0, 2.0), 1.0}, 0.8));
+    polygons.add(rectangle(3.0, 3.0, 4.0, 4.0));
+    const std::vector<Wall> lines{{{{-2.0, -1.0}, {2.0, -1.0}}, 0.1}};
+    const auto map = std::make_shared<const StaticMap>(polygons, lines, bounds);
+    const Pose pose{between(random, -2.0, 2.0), between(random, -0.8, 0.8), 0.0};
+    const auto kept = keep_out(map, robot.polygons(), size, pose, 0.3);
+    CHECK(keep_out(map, robot.polygons(), size, pose, 0.3) == kept);
+    CHECK(keep_out(map, robot.polygons(), size, pose, 0.0) == map);
+    CHECK(near_to(kept->polygons()[1][0].x, 2.7));
+    const OwnFootprint bare(robot.polygons(), 0.0);
+    const bool free = CollisionChecker(bare.view(), map->walls()).is_free(pose);
+    CHECK(CollisionChecker(bare.view(), kept->walls()).is_free(pose) == free);
+    const auto margin = start_margin(robot.polygons(), map->walls(), 0.3, pose);
+    CHECK(margin.has_value() == free);
+    if (!free) continue;
+    const OwnFootprint grown(robot.polygons(), *margin);
+    CHECK(CollisionChecker(grown.view(), map->walls()).is_free(pose));
+    CHECK(near_to(grown.view().radius, std::hypot(0.3 + *margin, 0.2 + *margin)));
+  }
+  const GoalRegion goal{GoalRegion::Kind::kDisc, {6.0, 0.0}, {}, 0.9};
+  CHECK(goal.is_outside(bounds) && !goal.is_outside({-5.0, -5.0, 5.2, 5.0}));
+}
+
+/// A robot that slides keeps its speed and its accelerations.
+void slides_keep_the_limits() {
+  Xorshift64Star random(7);
+  const SpeedLimits limits{0.5, 0.8, -0.8, 1.5, 0.6, 1.2, true, 0.0, 0.0};
+  std::vector<Pose> poses{{0.0, 0.0, 0.0}};
+  for (int i = 0; i < 50; ++i) {
+    const Pose step = random_pose(random, 0.2);
+    const Pose& last = poses.back();
+    poses.push_back({last.x + step.x, last.y + step.y, last.theta + 0.05 * step.theta});
+  }
+  std::vector<double> times(poses.size());
+  std::vector<double> speeds(poses.size());
+  std::vector<double> turn_rates(poses.size());
+  fill_sliding_profile(poses, limits, {0.0, 0.0}, {times, speeds, turn_rates});
+  for (std::size_t i = 0; i + 1 < poses.size(); ++i) {
+    const double length = std::hypot(poses[i + 1].x - poses[i].x, poses[i + 1].y - poses[i].y);
+    const double takes = times[i + 1] - times[i];
+    CHECK(near_to(length, speeds[i] * takes) && speeds[i] <= 0.8);
+    CHECK(near_to(poses[i + 1].theta - poses[i].theta, turn_rates[i] * takes));
+  }
+  CHECK(turn_acceleration(turn_rates, times) <= 1.2 + 1e-9 && turn_rates.back() == 0.0);
+  const std::array<double, 3> rates{1.0, 0.0, 0.0};
+  CHECK(turn_acceleration(rates, std::array<double, 3>{0.0, 1.0, 4.0}) == 0.5);
+}
+
+/// The bound is known to the straight line at first, then to the way around a wall.
+void bounds_know_walls_and_turns() {
+  OwnPolygons blocks;
+  blocks.add(rectangle(2.0, -3.0, 3.0, 3.0));
+  const StaticMap map(blocks, {}, {-1.0, -9.0, 9.0, 9.0});
+  const GoalRegion goal{GoalRegion::Kind::kDisc, {5.0, 0.0}, {}, 1.0};
+  const Pose start{0.0, 0.0, std::numbers::pi};
+  LengthBound bound(map, start, goal, 2.0, 0.1, 0.0);
+  CHECK(near_to(bound.cost(), 2.0 * 4.0));
+  while (!bound.run()) {
+  }
+  CHECK(bound.cost() > 2.0 * 7.0 && bound.cost() < 2.0 * 8.0);
+  const LengthBound turned(map, start, goal, 2.0, 0.1, 1.0);
+  CHECK(turned.cost() > 2.0 * (4.0 + 0.9 * std::numbers::pi));
+}
+
 }  // namespace
 }  // namespace pushplan
 
 int main() {
+  pushplan::coarse_paths_trade_length_against_weights();
+  pushplan::sealed_goals_are_known();
+  pushplan::goals_move_to_where_the_robot_fits();
   pushplan::dubins_paths_end_at_the_goal();
   pushplan::reeds_shepp_curves_end_at_the_goal();
   pushplan::checks_find_every_overlap();
+  pushplan::trees_find_doors();
+  pushplan::deviates_are_normal();
   pushplan::rooms_are_left_by_their_gaps();
   pushplan::primitives_join_lattice_points();
+  pushplan::margins_leave_the_robot_free();
+  pushplan::slides_keep_the_limits();
+  pushplan::bounds_know_walls_and_turns();
   return pushplan::tests::finish();
 }

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <numeric>
 
@@ -22,8 +21,6 @@ namespace pushplan {
 namespace {
 
 using namespace tests;
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// A box on the middle of a flat bumper goes straight ahead with it; pushes keep no overlap.
 void boxes_stay_on_the_bumper() {

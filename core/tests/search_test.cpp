@@ -1,12 +1,12 @@
 // Graph search, which Python sees through its lattices only.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <utility>
 #include <vector>
 
 #include "check.hpp"
+#include "pushplan/arithmetic.hpp"
 #include "pushplan/random.hpp"
 #include "pushplan/search/astar.hpp"
 #include "pushplan/search/grid_dijkstra.hpp"
@@ -14,11 +14,8 @@
 namespace pushplan {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr Index kStart = 0;
 constexpr Index kGoal = 7;
-
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 /// A directed graph with bounds of the costs to the goal.
 struct Graph {

@@ -29,11 +29,12 @@ pushplan::World room() {
   world.robot.max_acceleration = 1.0;
   world.robot.max_turn_acceleration = 4.0;
   world.robot_pose = {1.0, 1.0, 0.0};
-  world.walls = {rectangle(3.9, 0.0, 4.1, 1.2), rectangle(3.9, 2.6, 4.1, 4.0)};
-  world.objects = {{rectangle(3.8, 1.7, 4.2, 2.1), 3.0}, {rectangle(5.8, 1.8, 6.2, 2.2), 3.0}};
+  world.map = pushplan::make_map({rectangle(3.9, 0.0, 4.1, 1.2), rectangle(3.9, 2.6, 4.1, 4.0)},
+                                 {0.0, 0.0, 8.0, 4.0});
+  world.objects = {pushplan::make_object({rectangle(3.8, 1.7, 4.2, 2.1)}, 3.0),
+                   pushplan::make_object({rectangle(5.8, 1.8, 6.2, 2.2)}, 3.0)};
   world.goal = {pushplan::GoalRegion::Kind::kDisc, {7.0, 3.0}, {}, 0.1};
   world.goal.heading = 1.57;
-  world.bounds = {0.0, 0.0, 8.0, 4.0};
   return world;
 }
 
@@ -76,8 +77,7 @@ bool plan_and_follow(const char* name, pushplan::SearchKind search) {
   const pushplan::World world = room();
   pushplan::PlannerOptions options;
   options.search = search;
-  options.iterations = 4'000;
-  const pushplan::Plan plan = pushplan::plan(world, options);
+  const pushplan::Plan plan = pushplan::plan(world, options, 4'000);
   if (plan.status != pushplan::PlanStatus::kSolved) {
     std::printf("%s: no plan: %s\n", name, plan.message.c_str());
     return false;

@@ -34,12 +34,18 @@ def run(options: argparse.Namespace) -> int:
 
     check_file(options.out)
     check_figure(options.render)
+    check_file(options.plain)
     stop: Stop | None = None
     if options.deadline is not None:
         stop = Deadline(options.deadline)
     elif options.iterations is not None:
         stop = MaxIterations(options.iterations)
     world = load_world(options.world)
+    if options.plain:
+        from pushplan.motion.path_planner import core_world
+
+        written = core_world(world.for_planning()).written()
+        Path(options.plain).write_text(written, encoding="ascii")
     spec = parse_planner(options.planner)
     planner = spec.make_planner()
     try:
@@ -65,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
         say_json(data)
     else:
         _print(spec.label, result)
-    say_written(options, options.out, options.render)
+    say_written(options, options.out, options.plain, options.render)
     if objection is not None:
         raise PushplanError(f"planner {spec.label!r} says {result.status.label}, but {objection}")
     return 0 if result.plan is not None else 1
@@ -125,6 +131,8 @@ def _as_dict(options: argparse.Namespace, label: str, result: PlanResult) -> dic
     }
     if not math.isnan(stats.first_solution_s):
         data["stats"]["first_solution_s"] = stats.first_solution_s
+    if "seed" in stats.detail:
+        data["stats"]["seed"] = int(stats.detail["seed"])
     if plan is not None:
         arrays = ("times", "poses", "speeds", "turn_rates")
         data["plan"] = {

@@ -101,8 +101,7 @@ def teleop(options: argparse.Namespace) -> int:
     scenario = scenario_of(options)
     check_file(options.out)
     env = _environment(scenario, options.action)
-    from pushplan.cli.cockpit import drive
-    from pushplan.cli.keyboard import Keyboard
+    from pushplan.cli.cockpit import Keyboard, drive
     from pushplan.envs.window import Window
 
     keyboard = Keyboard()

@@ -8,18 +8,15 @@ from pushplan.control.episode_clock import EpisodeClock
 from pushplan.control.executors import DelayedExecutor, ImmediateExecutor, SimulatedExecutor
 from pushplan.control.leg_follower import LegFollower, Legs
 from pushplan.control.limits import TwistLimiter, clamp_twist
-from pushplan.control.path_follower import PathFollower
-from pushplan.control.pose_follower import PoseFollower
+from pushplan.control.path_follower import PathFollower, PurePursuit
 from pushplan.control.progress_checker import (
     PoseProgressChecker,
     ProgressChecker,
     StallChecker,
     decrease_by,
 )
-from pushplan.control.pure_pursuit import PurePursuit
-from pushplan.control.recovery import Recovery
+from pushplan.control.recovery import PoseFollower, Recovery, waiting_twist
 from pushplan.control.tracking import Progress
-from pushplan.control.waiting import waiting_twist
 from pushplan.imports.on_demand import lazy_names
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""`Recovery`: a drive out of a place where the robot does not get on, with an end."""
+"""Drives of a robot that is stuck (`Recovery`) or has no plan yet (`waiting_twist`)."""
 
 from __future__ import annotations
 
@@ -6,14 +6,85 @@ import math
 
 import numpy as np
 
-from pushplan.control.limits import clamp_twist
-from pushplan.control.pose_follower import PoseFollower
-from pushplan.control.progress_checker import StallChecker
+from pushplan.control.limits import arc_twist, clamp_twist
+from pushplan.control.progress_checker import ProgressChecker, StallChecker, decrease_by
+from pushplan.core import control as core
 from pushplan.core import geometry, motion
 from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.room_ahead import recovery_path
-from pushplan.world import Drive, Twist, World
-from pushplan.world.checks import FloatArray, expect, number
+from pushplan.world import Drive, RobotModel, Twist, World
+from pushplan.world.checks import FloatArray, array, expect, number
+
+_STEP_PATIENCE = 3.0
+"""Time that may pass without getting on, in times that a step takes at full speed."""
+_PROGRESS = 0.01  # by which a robot that gets on comes nearer to a pose [circumscribed radii]
+_REACHED = 0.3  # of a step may be left when the next one begins, so that it does not slow down
+
+
+class PoseFollower:
+    """Drives along poses that are a step of the path apart, ahead or back.
+
+    Args:
+        robot: its limits.
+        poses: (N, 3) where to go.
+        response: time in which an error is driven off [s].
+    """
+
+    def __init__(self, robot: RobotModel, poses: FloatArray, response: float) -> None:
+        self._robot = expect("robot", robot, RobotModel)
+        self._poses: FloatArray = array("poses", poses, (None, 3))
+        self._response = response
+        self._next = 1
+        self._stall = StallChecker(robot)
+        self._progress: ProgressChecker[float] | None = None
+
+    def drive(self, world: World, held: float) -> Twist | None:
+        """`command` for where and when the robot is in a world."""
+        return self.command(world.robot_pose, world.time, held)
+
+    def command(self, pose: FloatArray, time: float, held: float) -> Twist | None:
+        """The velocity to drive now; None when it is there, or does not get there.
+
+        Args:
+            pose: (3,) of the robot.
+            time: [s].
+            held: for how long the command will be held [s].
+        """
+        robot = self._robot
+        size = self._robot.circumscribed_radius
+        if self._stall.update(pose, time):
+            return None
+        seconds = max(held, self._response)
+        while self._next < len(self._poses):
+            before = self._poses[self._next - 1]
+            target = self._poses[self._next]
+            c = math.cos(float(pose[2]))
+            s = math.sin(float(pose[2]))
+            dx, dy = (float(value) for value in target[:2] - pose[:2])
+            ahead = c * dx + s * dy
+            aside = c * dy - s * dx
+            turn = math.remainder(float(target[2] - pose[2]), math.tau)
+            moves = float(c * (target[0] - before[0]) + s * (target[1] - before[1]))
+            turns = abs(float(target[2] - before[2]))
+            off = size * abs(turn)
+            if moves:
+                off = ahead * math.copysign(1.0, moves)
+            if self._progress is None:
+                lasts = abs(moves) / robot.max_speed + turns / robot.max_turn_rate
+                patience = _STEP_PATIENCE * max(lasts, 2.0 * seconds)
+                self._progress = ProgressChecker(decrease_by(_PROGRESS * size), patience)
+            reached = off < _REACHED * (abs(moves) + size * turns)
+            if reached or not self._progress.update(off, time):
+                self._next += 1
+                self._progress = None
+                continue
+            if moves:
+                turn += (aside / size) * math.copysign(1.0, ahead)
+            command = arc_twist(robot, ahead, turn, seconds)
+            self._stall.send(command)
+            return command
+        return None
+
 
 _WAYS = ((-1.0, 0.0), (-0.5, 1.0), (-0.5, -1.0), (1.0, 0.0), (0.5, 1.0), (0.5, -1.0))
 """Speed and turn rate, as fractions of the greatest, that are tried in turn."""
@@ -24,6 +95,11 @@ _FREED = 0.03  # a way that has moved the robot by less has not freed it [circum
 _LOOK = 0.3
 _POSES = 3
 _DEEPER = 1e-3  # by how much the robot may get deeper into a wall [circumscribed radii]
+_AHEAD = (1.0, 0.5, 0.25, 0.0)
+"""Distances straight ahead at which circles are tried [circumscribed radii]."""
+_TURNS = (0.0, 0.5, -0.5, 1.0, -1.0)
+"""Turn rates of the arcs tried where no circle fits, as fractions of the greatest; first wins."""
+_SPACING = 0.15  # distance between the poses that are looked at [circumscribed radii]
 
 
 class Recovery:
@@ -136,3 +212,37 @@ class Recovery:
             if not inside or self._walls.depth(there) > allowed:
                 return True
         return False
+
+
+def waiting_twist(world: World) -> Twist:
+    """Stand still; a robot that cannot drives where it can go on for longest.
+
+    It goes straight as long as there is room a little ahead for the tightest circle that it can
+    drive, and then drives that. Where no circle fits it takes the arc that stays clear of what is
+    static for longest.
+
+    Args:
+        world: the scene now.
+    """
+    robot = expect("world", world, World).robot
+    if robot.can_stop:
+        return Twist(0.0, 0.0)
+    shape = footprint(robot)
+    walls = obstacles(world.static)
+    circle = math.tau * robot.turning_radius
+    step = min(_SPACING * shape.radius, circle / 16.0)
+
+    def clear(twist: Twist, length: float, ahead: float = 0.0) -> float:
+        """Return the clear length of an arc, up to ``length``, that begins straight ahead."""
+        turn = step * twist.angular / twist.linear
+        first = math.ceil(ahead / step)
+        most = math.ceil((ahead + length) / step)
+        at = world.robot_pose
+        return step * core.clear_steps(step, turn, first, most, shape, walls, at) - ahead
+
+    arcs = [clamp_twist(robot, robot.max_speed, share * robot.max_turn_rate) for share in _TURNS]
+    for ahead in _AHEAD:
+        for arc in arcs[-2:]:
+            if clear(arc, circle, ahead * shape.radius) >= circle:
+                return arcs[0] if ahead else arc
+    return max(arcs, key=lambda arc: clear(arc, circle + shape.radius))

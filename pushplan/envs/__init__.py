@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pushplan.envs.making import make, make_vector
     from pushplan.envs.push_env import EpisodeOverError, PushEnv
     from pushplan.envs.rollout import RolloutInteraction
-    from pushplan.envs.trace import Trace
+    from pushplan.envs.simulators.base import Trace
     from pushplan.envs.vector_env import VectorWorkerError, WorkerVectorEnv
 
 __all__ = [
@@ -39,7 +39,7 @@ __getattr__, __dir__ = lazy_names(
         "making": "make make_vector",
         "push_env": "EpisodeOverError PushEnv",
         "rollout": "RolloutInteraction",
-        "trace": "Trace",
+        "simulators.base": "Trace",
         "vector_env": "VectorWorkerError WorkerVectorEnv",
     },
 )

@@ -16,11 +16,10 @@ from numpy.typing import ArrayLike, NDArray
 from pushplan.control import clamp_twist
 from pushplan.envs.action_modes import ActionMode, Motion, chosen_action, waiting
 from pushplan.envs.registry import ACTIONS, SIMULATORS, default_preset, task_class
-from pushplan.envs.rendering import Renderer
-from pushplan.envs.simulators.base import Simulator
+from pushplan.envs.simulators.base import Simulator, Trace
 from pushplan.envs.start_checks import check_start
 from pushplan.envs.tasks.base import StepOutcome, Task
-from pushplan.envs.trace import Trace
+from pushplan.envs.window import Renderer
 from pushplan.imports.on_demand import look_up, need
 from pushplan.observation import ObservationBuilder
 from pushplan.world import (

@@ -34,10 +34,9 @@ if TYPE_CHECKING:
     )
     from pushplan.evaluation.statistics.summary import PairedDifference, PolicySummary
     from pushplan.evaluation.store.database import DamagedResultsError
-    from pushplan.evaluation.store.merging import Merged, merge
+    from pushplan.evaluation.store.merging import Merged, Salvaged, merge, salvage
     from pushplan.evaluation.store.rescoring import Rescored, rescore
     from pushplan.evaluation.store.rows import TIMING_COLUMNS, ResultRow, Status, columns
-    from pushplan.evaluation.store.salvaging import Salvaged, salvage
     from pushplan.evaluation.store.status import RunStatus, run_status
     from pushplan.evaluation.stress_testing import CONDITIONS, Condition, ScoreSheet, stress
 
@@ -100,7 +99,7 @@ __getattr__, __dir__ = lazy_names(
         "run.recording": "run_episode",
         "experiment": "Experiment",
         "run.jobs": "Job JobResult JobSettings",
-        "store.merging": "Merged merge",
+        "store.merging": "Merged Salvaged merge salvage",
         "run.policy_specs": (
             "PolicySpec UnusablePolicyError parse_planner parse_policies parse_policy"
         ),
@@ -109,7 +108,6 @@ __getattr__, __dir__ = lazy_names(
         "report.results": "Results",
         "store.rows": "TIMING_COLUMNS ResultRow Status columns",
         "statistics.estimates": "Estimate Proportion bootstrap_interval wilson",
-        "store.salvaging": "Salvaged salvage",
         "store.status": "RunStatus run_status",
         "stress_testing": "CONDITIONS Condition ScoreSheet stress",
         "statistics.summary": "PairedDifference PolicySummary",

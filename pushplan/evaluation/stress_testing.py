@@ -23,8 +23,7 @@ from pushplan.evaluation.statistics.estimates import wilson
 from pushplan.evaluation.store.rows import ResultRow
 from pushplan.files.safe_files import read_data
 from pushplan.metrics import Role, metric_names
-from pushplan.runtime.disturbances import Disturbances
-from pushplan.runtime.disturbed_policy import DisturbedPolicy
+from pushplan.runtime.disturbed_policy import Disturbances, DisturbedPolicy
 from pushplan.scenarios.scenario import Variations
 from pushplan.world import InvalidInputError, UnknownNameError
 from pushplan.world.checks import number

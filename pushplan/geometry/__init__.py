@@ -12,9 +12,8 @@ from pushplan.geometry.polygon import (
     polygon_inertia,
 )
 from pushplan.geometry.raster import fill_convex
-from pushplan.geometry.shortest_path import GoalDistances, Path, goal_distances
+from pushplan.geometry.shortest_path import GoalDistances, Path, VisibilityGraph, goal_distances
 from pushplan.geometry.transforms import transform_outlines, transform_points
-from pushplan.geometry.visibility_graph import VisibilityGraph
 
 __all__ = [
     "GeodesicField",

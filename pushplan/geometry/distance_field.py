@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pushplan.core import geometry as core
-from pushplan.geometry.contours import standoff_of
 from pushplan.geometry.grid import Grid, clearance_field, nearest_marked
 from pushplan.geometry.regions import outside_area
 from pushplan.geometry.shortest_path import GoalDistances, goal_distances
@@ -102,8 +101,7 @@ class GeodesicField:
 def _field(source: GoalDistances, resolution: float) -> GeodesicField:
     grid = Grid.cover(source.static.bounds, resolution)
     values = np.empty(grid.shape)
-    sliver = standoff_of(source.static, source.clearance)
-    source.scene.fill_distances(values, grid.origin, resolution, source.nodes, sliver)
+    source.in_core.fill(values, grid.origin, resolution)
     values[outside_area(source.target, np.stack(np.meshgrid(grid.x, grid.y), axis=-1))] = 0.0
     return GeodesicField(frozen(values), grid, source)
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pushplan.core import geometry as core
-from pushplan.geometry.obstacles import obstacles_of
+from pushplan.geometry.obstacles import grown_map
 from pushplan.world import InvalidInputError, StaticMap
 from pushplan.world.checked_fields import CheckedFields, PositiveFloat, Shape
 from pushplan.world.checks import (
@@ -99,7 +99,7 @@ def clearance_field(
     """
     expect("grid", grid, Grid)
     out = np.empty(grid.shape)
-    shapes = obstacles_of(expect("static", static, StaticMap))
+    shapes = grown_map(expect("static", static, StaticMap)).obstacles
     piece = 1 + _PIECE // (1 + len(shapes.vertices))
     for first in range(0, out.size, piece):
         if stopped():

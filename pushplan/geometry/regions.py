@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -20,7 +19,7 @@ from pushplan.world import (
     Receptacle,
 )
 from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, array
-from pushplan.world.outline import convex_outline, flatten, unflatten
+from pushplan.world.outline import convex_outline, flatten
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,34 +97,3 @@ def outside_area(target: Target, points: FloatArray) -> BoolArray:
             offset = points - corner
             outside |= edge[0] * offset[..., 1] - edge[1] * offset[..., 0] < 0.0
     return outside
-
-
-def region_crossings(regions: core.Regions, edges: FloatArray) -> FloatArray:
-    """Points (N, 2) [m] where outlines of the regions cross segments (E, 4) [m].
-
-    A shortest path to a region ends at the region's nearest point or, where an obstacle covers
-    that, at one of these.
-    """
-    found = [np.zeros((0, 2))]
-    if len(edges) == 0:
-        return found[0]
-    start = edges[:, :2]
-    along = edges[:, 2:] - edges[:, :2]
-    for cx, cy, radius in regions.discs.tolist():
-        a = np.maximum((along**2).sum(axis=1), 1e-300)
-        offset = start - np.array([cx, cy])
-        b = (along * offset).sum(axis=1) / a
-        square = b**2 - ((offset**2).sum(axis=1) - radius * radius) / a
-        root = np.sqrt(np.maximum(square, 0.0))
-        for t in (-b - root, -b + root):
-            hit = (square >= 0.0) & (t >= 0.0) & (t <= 1.0)
-            found.append(start[hit] + t[hit, None] * along[hit])
-    reach = 2.0 * np.abs(edges).max() + 1.0
-    for px, py, nx, ny in regions.half_planes.tolist():
-        span = reach + math.hypot(px, py)
-        line = np.array([[px - span * ny, py + span * nx, px + span * ny, py - span * nx]])
-        found.append(core.segment_crossings(line, edges))
-    for loop in unflatten(regions.vertices, regions.offsets):
-        sides = np.ascontiguousarray(np.hstack([loop, np.roll(loop, -1, axis=0)]))
-        found.append(core.segment_crossings(sides, edges))
-    return np.ascontiguousarray(np.concatenate(found))

@@ -15,11 +15,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from pushplan.core import geometry as core
-from pushplan.geometry.contours import Contours, contours_of, gap_of, standoff_of
 from pushplan.geometry.grid import Grid, nearest_marked, occupancy
-from pushplan.geometry.obstacles import obstacles_of
-from pushplan.geometry.shortest_path import bends_of
+from pushplan.geometry.obstacles import grown_map
 from pushplan.world import StaticMap
 from pushplan.world.checks import FloatArray, IntArray, frozen
 
@@ -38,15 +35,12 @@ class BendDistances:
     # (rows, columns, B) length [m] of the shortest way that goes on past the bend; inf where no way
     # leads. Cells inside an obstacle have the value of the nearest free one.
     table: Table
-    bends: Contours  # the B places where shortest paths bend
     loops: FloatArray  # (V, 2) corners of convex polygons just around the obstacles [m], flattened
     offsets: IntArray  # (P + 1,) where each polygon starts
 
     def in_sight(self, x: float, y: float) -> tuple[IntArray, FloatArray]:
         """Bends over which a shortest path from a point [m] may lead, and how far each is [m]."""
-        sliver = standoff_of(self.static, 0.0)
-        around = obstacles_of(self.static)
-        return core.bends_in_sight(x, y, self.bends.bends, around, gap_of(self.static), sliver)
+        return grown_map(self.static).bends_in_sight(x, y)
 
 
 @lru_cache(maxsize=4)
@@ -55,31 +49,16 @@ def bend_distances(
     resolution: float,  # side of a cell [m]; more where the table would pass `MAX_VALUES`
 ) -> BendDistances:
     """The distances of a map, kept for the maps used last."""
-    bends, between = bends_of(static)
+    bare = grown_map(static)
+    count = bare.bend_count
     width, height = (static.bounds[2:] - static.bounds[:2]).tolist()
-    count = len(bends.corners)
     coarsest = math.sqrt(width * height * max(1, count) / MAX_VALUES)
     grid = Grid.cover(static.bounds, max(resolution, 1.01 * coarsest))
-    contours = contours_of(static)
-    ends = np.flatnonzero(np.diff(contours.owner, append=-1)) + 1
-    offsets = np.zeros(1, dtype=np.int64)
-    if len(contours.owner):
-        offsets = np.concatenate([offsets, ends])
-    offsets = frozen(offsets)
     table = np.empty((*grid.shape, count), dtype=np.float32)
-    core.fill_bend_distances(
-        table,
-        grid.origin,
-        grid.resolution,
-        bends.bends,
-        between,
-        contours.corners,
-        offsets,
-        gap_of(static),
-    )
+    bare.fill_bend_distances(table, grid.origin, grid.resolution)
     if count:
-        blocked = occupancy(static, grid, 2.0 * standoff_of(static, 0.0))
+        blocked = occupancy(static, grid, 2.0 * bare.standoff)
         if blocked.any() and not blocked.all():
             _, rows, cols = nearest_marked(~blocked)
             table[blocked] = table[rows[blocked], cols[blocked]]
-    return BendDistances(static, grid, frozen(table), bends, contours.corners, offsets)
+    return BendDistances(static, grid, frozen(table), *bare.outlines)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pushplan.core import gtsp as core
 from pushplan.errors import InvalidInputError
 from pushplan.gtsp.checking import (
     check_tour,
@@ -19,15 +20,13 @@ from pushplan.gtsp.checking import (
     graph_instance,
 )
 from pushplan.gtsp.distances import Distances
-from pushplan.gtsp.exact import expected_seconds, solve_exactly, table_mb
 from pushplan.gtsp.gtsp_config import GtspConfig
 from pushplan.gtsp.instance import GtspInstance
-from pushplan.gtsp.large import best_choice, promising
-from pushplan.gtsp.problem import Problem, StopFired, tour_cost, usable
+from pushplan.gtsp.problem import Padded, Problem, StopFired, tour_cost, usable
 from pushplan.gtsp.proof import prove
 from pushplan.gtsp.search import Budget, search
 from pushplan.gtsp.tour import Tour, TourStats, TourStatus
-from pushplan.world.checks import IntArray
+from pushplan.world.checks import FloatArray, IntArray
 from pushplan.world.stop import Stop, check_rules
 
 if TYPE_CHECKING:
@@ -45,6 +44,10 @@ CHOICE_S = 3e-5
 """Time that the choice among all nodes takes after a search, for each cluster [s]."""
 _PROOF_STATES = 2_000_000  # paths that a proof keeps at once at most
 _DEFAULT = GtspConfig()
+ARCS_PER_SECOND = 1.5e9
+"""Number of arcs that the core looks at in a second, on a slow machine."""
+NEAREST = 5
+"""Number of nearest clusters by which the promise of a node is judged."""
 
 
 def solve_gtsp(
@@ -308,3 +311,123 @@ class _SolverCall:
     def _stats(self, best_s: float = math.nan) -> TourStats:
         budget = self.budget
         return TourStats(budget.elapsed, best_s, budget.used, self.method, self.detail)
+
+
+def table_mb(problem: Problem) -> float:
+    """Memory of the table [MB], of up to a thousand clusters: more need no smaller one."""
+    free = min(problem.count - 1, 1000)  # a float holds no power of two beyond 1023
+    return 2.0**free * free * problem.width * 8.0 / 1e6
+
+
+def expected_seconds(problem: Problem) -> float:
+    """About how long it takes [s]."""
+    free = problem.count - 1
+    width = problem.width
+    roots = int(np.diff(problem.offsets).min())
+    return roots * free * max(free - 1, 1) * 2.0 ** (free - 2) * width**2 / ARCS_PER_SECOND
+
+
+def solve_exactly(
+    problem: Problem,  # with at least 2 clusters
+    stopped: Callable[[], bool],  # asked about every ``chunk_s``
+    chunk_s: float,  # [s]
+) -> tuple[bool, IntArray | None]:
+    """The cheapest tour.
+
+    Returns:
+        True if it got to its end, and the nodes in visiting order; None if no tour is finite or it
+        was stopped.
+    """
+    others = problem.members
+    roots = others.pop(problem.root)
+    padded = Padded.gather(problem.costs, others)
+    subsets = 1 << len(others)
+    table = np.empty((subsets, *padded.names.shape))
+    step = max(1, int(chunk_s / max(expected_seconds(problem) / subsets, 1e-9)))
+    best = np.inf
+    nodes = None
+    for root in roots:
+        first = padded.pick(problem.costs[root])
+        for low in range(1, subsets, step):
+            if stopped():
+                return False, None
+            high = min(low + step, subsets)
+            core.fill_subsets(low, high, table, padded.costs, padded.sizes, first)
+        ends = table[-1] + padded.pick(problem.costs[:, root])
+        if ends.min() < best:
+            best = ends.min()
+            nodes = np.array([root, *_path_to(int(ends.argmin()), table, padded)])
+    return True, nodes
+
+
+def _path_to(end: int, table: FloatArray, padded: Padded) -> list[int]:
+    """The nodes of the cheapest path to a node of a filled table, ``cluster * K + node``."""
+    left = list(range(len(padded.sizes)))
+    subset = len(table) - 1
+    path: list[int] = []
+    while left:
+        c, i = divmod(end, table.shape[2])
+        path.append(padded.names[left[c], i])
+        d = left.pop(c)
+        value = table[subset, d, i]
+        subset ^= 1 << d
+        before = table[subset, left] + padded.costs[left, :, d, i]  # (clusters that are left, K)
+        end = int((before == value).argmax()) if left else -1
+    return path[::-1]
+
+
+def promising(
+    costs: NDArray[np.number] | Distances,  # (N, N)
+    members: Sequence[IntArray],  # nodes of each cluster
+    most: int,  # nodes in all, but at least one of each cluster
+    # asked between clusters; what is not yet looked at keeps its order
+    stopped: Callable[[], bool],
+) -> list[IntArray]:
+    """The nodes of each cluster with the cheapest arcs from and to its nearest clusters.
+
+    Returns:
+        The nodes that are kept.
+    """
+    score = np.zeros(len(costs))
+    for arcs in (costs, costs.T):
+        nearest = np.full((NEAREST, len(costs)), np.inf)  # cheapest arcs with clusters, ascending
+        for nodes in members:
+            if stopped():
+                break
+            arc = arcs[nodes].min(axis=0).astype(np.float64)
+            arc[nodes] = np.inf
+            for row in nearest:
+                lower = np.minimum(row, arc)
+                arc = np.maximum(row, arc)
+                row[:] = lower
+        total = np.where(np.isfinite(nearest), nearest, 0.0).sum(axis=0)
+        score += np.where(np.isfinite(nearest[0]), total, np.inf)
+    each = max(1, most // len(members))
+    return [np.sort(nodes[np.argsort(score[nodes], kind="stable")[:each]]) for nodes in members]
+
+
+def best_choice(
+    costs: NDArray[np.number] | Distances,  # (N, N)
+    layers: Sequence[IntArray],  # nodes of each cluster in visiting order, at least 2 clusters
+    stopped: Callable[[], bool],  # asked between clusters
+) -> IntArray | None:
+    """The cheapest nodes for a closed order of clusters, on costs that are not gathered.
+
+    Returns:
+        A node of each; None if it was stopped.
+    """
+    values = np.where(np.eye(len(layers[0])) > 0.0, 0.0, np.inf)  # (root, node)
+    picks: list[IntArray] = []
+    for here, there in zip(layers, [*layers[1:], layers[0]], strict=True):
+        if stopped():
+            return None
+        arcs = costs[np.ix_(here, there)]
+        pick = (values[:, :, None] + arcs).argmin(axis=1)  # (root, there)
+        values = np.take_along_axis(values, pick, 1) + arcs[pick, np.arange(len(there))]
+        picks.append(pick)
+    at = root = int(np.diag(values).argmin())
+    chosen = []
+    for pick, nodes in zip(reversed(picks), reversed(layers), strict=True):
+        at = int(pick[root, at])
+        chosen.append(nodes[at])
+    return np.array(chosen[::-1], dtype=np.int64)

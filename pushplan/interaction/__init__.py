@@ -1,9 +1,8 @@
 """Motion of the objects when the robot sweeps along a path."""
 
 from pushplan.interaction.contact_parameters import ContactParameters, support_gyration
-from pushplan.interaction.identification import ObservedPush, identify
+from pushplan.interaction.identification import ObservedPush, find_pushes, identify
 from pushplan.interaction.interaction_model import Interaction, InteractionModel, SweepsMany
-from pushplan.interaction.logged_pushes import find_pushes
 from pushplan.interaction.quasi_static import QuasiStatic
 
 __all__ = [

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pushplan.core import geometry
 from pushplan.core import interaction as core
 from pushplan.geometry import gyration_squares
 from pushplan.interaction.interaction_model import Interaction, checked_path
@@ -126,19 +127,8 @@ def _thinnest(robot: RobotModel, shapes: _Shapes) -> float:
     """Half diagonal of the square that is as wide as the thinnest body [m]."""
     movables = shapes.movables
     outlines = [*robot.wall_parts, *unflatten(movables.part_vertices, movables.part_offsets)]
-    floor = robot.circumscribed_radius / _MOST_SLENDER
-    sizes = {len(outline) for outline in outlines}  # those with as many corners at once
-    widths = [_width(np.stack([o for o in outlines if len(o) == size])) for size in sizes]
-    return max(min(widths) / math.sqrt(2.0), floor)
-
-
-def _width(outlines: FloatArray) -> float:
-    """Least distance between two parallel lines that hold one of the outlines (K, N, 2) [m]."""
-    edges = np.roll(outlines, -1, axis=1) - outlines
-    normals = np.stack([-edges[..., 1], edges[..., 0]], axis=-1)
-    normals /= np.hypot(edges[..., 0], edges[..., 1])[..., None]
-    depths = (outlines[:, None] - outlines[:, :, None]) @ normals[..., None]  # (K, N, N, 1)
-    return float(depths[..., 0].max(axis=2).min())
+    width = min(map(geometry.least_width, outlines))
+    return max(width / math.sqrt(2.0), robot.circumscribed_radius / _MOST_SLENDER)
 
 
 @functools.lru_cache(maxsize=32)

@@ -12,19 +12,6 @@ from pushplan.world.checked_fields import (
     PositiveInt,
 )
 
-INSET = 0.05
-"""Depth in the goal at which a plan ends [R]: the robot is inside in spite of rounding."""
-SPACING = 0.15
-"""Distance between the poses of a path [R]."""
-EDGE = 1.6
-"""Longest edge of a tree [R]."""
-SHORTCUTS = 400
-"""Shortcuts tried on a path before its gain is looked at."""
-BATCH = 10
-"""Shortcuts between two looks at the stop rule; fewer among many objects, which take longer."""
-LEAST_GAIN = 0.001
-"""Fraction of its cost that a path must lose over `SHORTCUTS` to be worked on further."""
-
 
 @dataclass(frozen=True)
 class PathSearchConfig(CheckedFields):

@@ -10,7 +10,6 @@ import numpy as np
 from pushplan.core import motion as core
 from pushplan.geometry.angles import wrap_angle
 from pushplan.motion.collision import footprint, obstacles
-from pushplan.motion.goal_approach import fitting, path_end, run_up
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.speed_profile import along_arcs, turning_radius
 from pushplan.world import GoalPose, NavigationGoal, Plan, PlanResult, PlanStatus, World
@@ -127,7 +126,7 @@ def polyline_result(
     plan = polyline_plan(world, points, spacing)
     goal = world.navigation_goal
     if isinstance(goal, GoalPose) and not goal.reached_by(plan.poses[-1]):
-        plan = _ended_at(world, fitting(world, goal) or goal, plan, spacing) or plan
+        plan = _ended_at(world, goal, plan, spacing) or plan
     first = math.nan
     if _arrives(world, plan.poses[-1]):
         first = call.elapsed
@@ -135,20 +134,33 @@ def polyline_result(
 
 
 def _ended_at(world: World, goal: GoalPose, plan: Plan, spacing: float) -> Plan | None:
-    """A plan with an end at the goal's heading, driven at full speed; None if there is none."""
+    """A plan with an end at the goal's heading, driven at full speed; None if there is none.
+
+    A differential drive goes to the goal and turns on the spot, the shorter way if it can; where
+    it has no room for that, and for other drives, a curve of Dubins leads into the pose, or one of
+    Reeds and Shepp where a car may reverse.
+    """
     robot = world.robot
-    checker = core.CollisionChecker(footprint(robot), obstacles(keep_out(world)))
-    radius = turning_radius(robot, 1.0)
-    end = path_end(robot, goal, plan.poses, radius, spacing, checker)
-    if end is None:
-        straight = run_up(world, goal, radius)
-        end = path_end(robot, goal, plan.poses, radius, spacing, checker, straight)
-    if end is None:
+    kept, ending, curvatures = core.end_at_pose(
+        goal=np.array([2.0, *goal.center, goal.radius, goal.heading]),
+        tolerance=goal.heading_tolerance,
+        path=np.ascontiguousarray(plan.poses),
+        footprint=footprint(robot),
+        walls=obstacles(keep_out(world)),
+        size=robot.circumscribed_radius,
+        on_spot=robot.turns_on_spot,
+        curves_back=robot.curves_back,
+        reverses=robot.min_speed < 0.0,
+        radius=turning_radius(robot, 1.0),
+        spacing=spacing,
+    )
+    if not kept:
         return None
-    poses = np.concatenate([plan.poses[: end.kept], end.poses])
-    moves = np.diff(poses[end.kept - 1 :], axis=0)
-    on_spot = np.isinf(end.curvatures)
-    curvatures = np.where(on_spot, 0.0, end.curvatures)
+    poses = np.concatenate([plan.poses[:kept], ending])
+    moves = np.diff(poses[kept - 1 :], axis=0)
+    on_spot = np.isinf(curvatures)
+    turns = np.copysign(robot.max_turn_rate, curvatures)
+    curvatures = np.where(on_spot, 0.0, curvatures)
     lengths = along_arcs(np.hypot(moves[:, 0], moves[:, 1]), curvatures)
     most = robot.max_turn_rate
     speeds = np.full(len(moves), robot.max_speed)
@@ -156,10 +168,10 @@ def _ended_at(world: World, goal: GoalPose, plan: Plan, spacing: float) -> Plan 
         speeds = np.minimum(speeds, most / np.maximum(np.abs(curvatures), 1e-12))
     lasts = np.where(on_spot, np.abs(moves[:, 2]) / most, lengths / speeds)
     speeds[on_spot] = 0.0
-    rates = np.where(on_spot, np.copysign(most, end.curvatures), speeds * curvatures)
-    before = end.kept - 1
+    rates = np.where(on_spot, turns, speeds * curvatures)
+    before = kept - 1
     return Plan(
-        times=np.concatenate([plan.times[: end.kept], plan.times[before] + np.cumsum(lasts)]),
+        times=np.concatenate([plan.times[:kept], plan.times[before] + np.cumsum(lasts)]),
         poses=poses,
         speeds=np.concatenate([plan.speeds[:before], speeds, speeds[-1:]]),
         turn_rates=np.concatenate([plan.turn_rates[:before], rates, rates[-1:]]),

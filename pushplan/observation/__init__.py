@@ -1,8 +1,7 @@
 """A `pushplan.world.World` as what a policy observes. No simulator, no Gymnasium."""
 
 from pushplan.observation.builder import ObservationBuilder
-from pushplan.observation.channels import CHANNELS
-from pushplan.observation.image import ImageObservation
+from pushplan.observation.channels import CHANNELS, ImageObservation
 from pushplan.observation.state import StateObservation
 
 __all__ = ["CHANNELS", "ImageObservation", "ObservationBuilder", "StateObservation"]

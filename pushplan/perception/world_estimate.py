@@ -18,7 +18,7 @@ from pushplan.world import Goal, Movables, PriceMap, RobotModel, StaticMap, Twis
 from pushplan.world.checks import FloatArray, array, checked_bounds, choice, expect, number
 from pushplan.world.occupancy_grid import UNKNOWN
 from pushplan.world.outline import transform
-from pushplan.world.unseen import Unseen
+from pushplan.world.scene import Unseen
 
 _CELLS = 8.0  # to the inscribed radius of the robot
 _RIM = 1.5  # cells around an object in which a beam that meets it is taken to have hit it

@@ -10,20 +10,16 @@ import numpy as np
 
 from pushplan.geometry import VisibilityGraph
 from pushplan.interaction import QuasiStatic
-from pushplan.motion.dubins_warm_start import along_guide
 from pushplan.motion.keep_out import keep_out
-from pushplan.motion.path_improver import PathImprover
+from pushplan.motion.path_planner import plan_path
 from pushplan.motion.path_search_config import PathSearchConfig
 from pushplan.motion.polyline_plan import polyline_result
-from pushplan.motion.speed_profile import start_margin, turning_radius
+from pushplan.motion.speed_profile import start_margin
 from pushplan.planners.following.plan_controller import PlanController
 from pushplan.planners.following.plan_follower import PlanFollower
 from pushplan.world import Drive, Movables, Planner, PlanResult, PlanStatus, Stop, World
 from pushplan.world.checks import number
 from pushplan.world.planning_call import PlanningCall
-
-_TRIES = 4
-"""Tries to lead a car along the path: the last ones turn as sharply as it can."""
 
 
 @dataclass(frozen=True)
@@ -86,19 +82,11 @@ def _in_curves(call: PlanningCall, looks: int) -> PlanResult | None:
     """The path as a car or an omnidirectional robot can drive it; None where it hits a wall."""
     alone = copy.copy(call)
     alone.world = replace(call.world, movables=Movables.empty())
-    config = PathSearchConfig()
-    radius = turning_radius(alone.world.robot, config.turn_fraction)
-    improver = PathImprover(alone, config, QuasiStatic(), radius)
-    if improver.begin() is not None:
+    found = plan_path(alone, PathSearchConfig(), QuasiStatic(), "shortest_path").plan
+    if found is None:
         return None
-    for _ in range(_TRIES):
-        if along_guide(improver):
-            plan = improver.result(PlanStatus.SOLVED).plan
-            assert plan is not None
-            plan = replace(plan, object_poses=None)
-            return call.result(PlanStatus.SOLVED, plan, call.elapsed, looks)
-        improver.relax()
-    return None
+    plan = replace(found, object_poses=None)
+    return call.result(PlanStatus.SOLVED, plan, call.elapsed, looks)
 
 
 def straight(planner: Planner | None = None) -> PlanFollower:

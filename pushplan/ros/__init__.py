@@ -2,7 +2,6 @@
 
 from pushplan.ros.mcap_episodes import load_episode, save_episode
 from pushplan.ros.mcap_writer import McapLog
-from pushplan.ros.message_types import MessageTypes, RclpyTypes, RosbagsTypes
 from pushplan.ros.reading import (
     frame_of,
     path_from,
@@ -14,7 +13,7 @@ from pushplan.ros.reading import (
     time_from,
     twist_from,
 )
-from pushplan.ros.ros_messages import Messages
+from pushplan.ros.ros_messages import Messages, MessageTypes, RclpyTypes, RosbagsTypes
 
 __all__ = [
     "McapLog",

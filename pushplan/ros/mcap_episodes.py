@@ -23,7 +23,7 @@ from pushplan.ros.mcap_writer import (
     WORLD,
     McapWriter,
 )
-from pushplan.ros.message_types import RosbagsTypes
+from pushplan.ros.ros_messages import RosbagsTypes
 from pushplan.world import Episode, SchemaError
 from pushplan.world.checks import FloatArray
 from pushplan.world.stored.world_files import world_from_dict

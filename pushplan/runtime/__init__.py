@@ -2,8 +2,7 @@
 
 from pushplan.control import DelayedExecutor
 from pushplan.runtime.command import Command, CommandStatus, RunLog
-from pushplan.runtime.disturbances import Disturbances
-from pushplan.runtime.disturbed_policy import DisturbedPolicy
+from pushplan.runtime.disturbed_policy import Disturbances, DisturbedPolicy
 from pushplan.runtime.motors import Motors
 from pushplan.runtime.runner import PLAN_STOP, Runner
 from pushplan.runtime.state_estimator import StateEstimator

@@ -12,8 +12,7 @@ from pushplan.scenarios.scenario import Scenario, load_scenarios, save_scenarios
 from pushplan.scenarios.suite import Suite, suite, suite_names, world_suite
 
 if TYPE_CHECKING:
-    from pushplan.scenarios.floe_sizes import FloeSizes
-    from pushplan.scenarios.ice_field import IceField
+    from pushplan.scenarios.ice_field import FloeSizes, IceField
     from pushplan.scenarios.ice_files import load_ice, save_ice
     from pushplan.scenarios.ice_generator import generate_ice
     from pushplan.scenarios.office import generate_office
@@ -40,8 +39,7 @@ __all__ = [
 __getattr__, __dir__ = lazy_names(
     __name__,
     {
-        "floe_sizes": "FloeSizes",
-        "ice_field": "IceField",
+        "ice_field": "FloeSizes IceField",
         "ice_files": "load_ice save_ice",
         "ice_generator": "generate_ice",
         "office": "generate_office",

@@ -282,7 +282,7 @@ def _apart(field: IceField, room: FloatArray | None) -> IceField:
     """The field with overlapping floes moved apart, within a rectangle (4,) [m] if there is one."""
     boxes = _boxes(field.floes)
     shifts = np.zeros((len(field), 2))
-    tests, pairs = _overlaps(field, boxes, shifts)
+    tests, pairs = _overlaps(field, shifts)
     if not pairs:
         return field
     if room is not None and field.areas.sum() > np.prod(room[2:] - room[:2]):
@@ -303,7 +303,7 @@ def _apart(field: IceField, room: FloatArray | None) -> IceField:
             least = np.minimum(room[:2] - boxes[:, :2], 0.0)
             most = np.maximum(room[2:] - boxes[:, 2:], 0.0)
             shifts = np.clip(shifts, least, most)
-        count, pairs = _overlaps(field, boxes, shifts)
+        count, pairs = _overlaps(field, shifts)
         tests += count
         depths.append(max((pair.depth for pair in pairs), default=0.0))
     if pairs:
@@ -340,7 +340,7 @@ class _Overlap(NamedTuple):
     normal: FloatArray  # (2,) unit, the way out for the second
 
 
-def _overlaps(field: IceField, boxes: FloatArray, shifts: FloatArray) -> tuple[int, list[_Overlap]]:
+def _overlaps(field: IceField, shifts: FloatArray) -> tuple[int, list[_Overlap]]:
     """Count tests of parts, and find the deepest overlap of each pair of shifted floes."""
     parts = [part + shifts[k] for k, floe in enumerate(field.floes) for part in floe]
     owners = np.repeat(np.arange(len(field)), [len(floe) for floe in field.floes])

@@ -10,15 +10,23 @@ from scipy.spatial import cKDTree
 
 from pushplan.core import geometry
 from pushplan.core import scenarios as core
-from pushplan.scenarios.floe_sizes import MARGIN, FloeSizes
-from pushplan.scenarios.ice_field import IceField
-from pushplan.scenarios.rough_floes import MOST_ROUGHNESS, roughened
+from pushplan.scenarios.ice_field import MARGIN, FloeSizes, IceField
 from pushplan.world import InvalidInputError, ScenarioError
 from pushplan.world.checks import FloatArray, IntArray, checked_bounds, number
 from pushplan.world.convex_shapes import disjoint
-from pushplan.world.outline import ConvexParts, convex_outlines, flatten, unflatten
-from pushplan.world.outline_repair import MOST_CHANGE
+from pushplan.world.outline import ConvexParts, centroid, convex_outlines, flatten, unflatten
+from pushplan.world.outline_repair import MOST_CHANGE, outline_parts
 
+MOST_ROUGHNESS = 0.4
+"""With more, floes would be stars."""
+_EDGE_RADII = 0.06  # length of an edge, in mean radii of the field
+_ROUGH_CORNERS = (24, 300)
+_LEAST_EDGES = 8  # of a wave: small floes are smoother than large ones
+_DECAY = 1.7  # of their amplitudes with the number of periods
+_MOST_BAYS = 3
+_BAY_DEPTHS = (3.0, 10.0)  # in standard deviations of the waves
+_BAY_WIDTHS = (0.12, 0.4)  # [rad]
+_DEEPEST = 0.7  # [distance from the middle to the convex outline]
 MOST_FLOES = 20_000
 """More than this is refused: a typing error rather than a wish."""
 _DRAWS = 200
@@ -62,7 +70,7 @@ def generate_ice(
         clumping: 0 for floes that are as likely everywhere, 1 for dense patches and open water.
             The denser the ice, the less space there is for it.
         roughness: 0 for convex floes; else the fraction, at most 0.4, of a convex floe that is
-            carved away for a rough outline and bays (`pushplan.scenarios.rough_floes`). Real ones
+            carved away for a rough outline and bays (`pushplan.scenarios.ice_generator`). Real ones
             look like 0.2.
 
     Raises:
@@ -259,3 +267,71 @@ def _shrunk(floes: list[ConvexParts], fraction: float) -> tuple[ConvexParts, ...
     smaller = middles + np.sqrt(fraction) * (vertices - middles)
     outlines = iter(unflatten(smaller, flatten([part for parts in floes for part in parts])[1]))
     return tuple(tuple(next(outlines) for _ in parts) for parts in floes)
+
+
+def roughened(
+    rng: np.random.Generator, floes: Sequence[FloatArray], roughness: float, mean_radius: float
+) -> list[ConvexParts]:
+    """Carve rough outlines out of convex floes; what is left of each lies inside of it.
+
+    The distance of the outline from the middle of a floe falls short of that of the convex one by
+    a random function of the angle: waves whose amplitudes fall with their frequency, and up to
+    three bays.
+
+    Args:
+        rng: the only source of randomness.
+        floes: convex outlines, each (N, 2) [m].
+        roughness: fraction of the area of each floe that is carved away.
+        mean_radius: of the floes of the field [m]; edges are a small part of it.
+
+    Returns:
+        The convex parts of each floe.
+    """
+    return [
+        outline_parts("floe", _rough_outline(rng, floe, roughness, mean_radius), smooth=True).parts
+        for floe in floes
+    ]
+
+
+def _rough_outline(
+    rng: np.random.Generator, floe: FloatArray, roughness: float, mean_radius: float
+) -> FloatArray:
+    middle = centroid(floe)
+    length = np.hypot(*(np.roll(floe, -1, axis=0) - floe).T).sum()
+    count = int(np.clip(length / (_EDGE_RADII * mean_radius), *_ROUGH_CORNERS))
+    angles = 2.0 * np.pi * (np.arange(count) + rng.uniform(-0.3, 0.3, count)) / count
+    reach = _distances(floe - middle, angles)
+    depth = _depths(rng, angles)
+    # least t for which the area of radii (1 - t depth) reach is 1 - roughness of what it was
+    once = (reach**2 * depth).sum()
+    twice = (reach**2 * depth**2).sum()
+    lost = roughness * (reach**2).sum()
+    root = np.sqrt(max(0.0, once**2 - twice * lost))
+    share = np.minimum(_DEEPEST, (once - root) / twice * depth)
+    radii = reach * (1.0 - share)
+    outline: FloatArray = np.stack([np.cos(angles), np.sin(angles)], axis=1) * radii[:, None]
+    return middle + outline
+
+
+def _depths(rng: np.random.Generator, angles: FloatArray) -> FloatArray:
+    """Depths (N,) of the outline at some angles, relative to each other; the least is 0."""
+    periods = np.arange(2.0, max(3, len(angles) // _LEAST_EDGES))
+    amplitudes = rng.standard_normal(len(periods)) * periods**-_DECAY
+    phases = rng.uniform(0.0, 2.0 * np.pi, len(periods))
+    waves = (amplitudes * np.cos(np.outer(angles, periods) + phases)).sum(axis=1)
+    depth: FloatArray = (waves - waves.min()) / waves.std()
+    for _ in range(int(rng.integers(_MOST_BAYS + 1))):
+        turn = np.angle(np.exp(1j * (angles - rng.uniform(0.0, 2.0 * np.pi))))
+        depth += rng.uniform(*_BAY_DEPTHS) * np.exp(-((turn / rng.uniform(*_BAY_WIDTHS)) ** 2))
+    return depth
+
+
+def _distances(outline: FloatArray, angles: FloatArray) -> FloatArray:
+    """Distances (N,) from the origin to a convex outline around it, at some angles [m]."""
+    edges = np.roll(outline, -1, axis=0) - outline
+    normals = np.stack([edges[:, 1], -edges[:, 0]], axis=1)
+    offsets = (normals * outline).sum(axis=1)
+    along = np.outer(np.cos(angles), normals[:, 0]) + np.outer(np.sin(angles), normals[:, 1])
+    with np.errstate(divide="ignore"):
+        reach: FloatArray = np.where(along > 0.0, offsets / along, np.inf)
+    return np.asarray(reach.min(axis=1))

@@ -1,7 +1,7 @@
 """Dijkstra's algorithm over the cells of a grid with eight neighbours each.
 
-It serves the coarse path of the navigation planners and the floor of the push-aware planner's
-cost-to-go. Three searches stay apart. `relax` of the core runs over a graph of bends, not
+It serves the coarse path of the navigation planners, in the core, and the floor of the push-aware
+planner's cost-to-go. Three searches stay apart. `relax` of the core runs over a graph of bends, not
 over a grid. The distance fields of `geometry.distance_field` are exact: no cell depends on
 another. The search over poses of `planners.rearrangement.pose_search` has headings, costs that
 depend on both ends of a move, and so many poses that buckets take the place of the heap.

@@ -8,7 +8,6 @@ from pushplan.errors import (
     SchemaError,
     UnknownNameError,
 )
-from pushplan.world.actions import Action, Twist, WheelSpeeds
 from pushplan.world.goals import (
     AreaGoal,
     ClearanceArea,
@@ -36,10 +35,9 @@ from pushplan.world.policy_abilities import (
     PlansBesideDriving,
     ShowsPlan,
 )
-from pushplan.world.price_map import PriceMap
-from pushplan.world.protocols import Controller, Planner, Policy
+from pushplan.world.protocols import Action, Controller, Planner, Policy, Twist, WheelSpeeds
 from pushplan.world.robot import Drive, RobotModel
-from pushplan.world.scene import World
+from pushplan.world.scene import PriceMap, Unseen, World
 from pushplan.world.seeds import stream
 from pushplan.world.static_map import StaticMap
 from pushplan.world.stop import (
@@ -64,7 +62,6 @@ from pushplan.world.stored.robots import (
     turtlebot3_burger,
 )
 from pushplan.world.stored.world_files import load_world, save_world, world_from_dict, world_to_dict
-from pushplan.world.unseen import Unseen
 
 __all__ = [
     "BUMPERS",

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pushplan.core import geometry as core
 from pushplan.errors import InvalidInputError, short
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, array, frozen
 
@@ -51,10 +52,7 @@ def inscribed_radius(corners: FloatArray) -> float:
     Args:
         corners: (V, 2) counter-clockwise [m].
     """
-    edges = np.roll(corners, -1, axis=0) - corners
-    # distance of the origin to each edge line, positive inside a counter-clockwise outline
-    inside = edges[:, 1] * corners[:, 0] - edges[:, 0] * corners[:, 1]
-    return max(0.0, float((inside / np.hypot(edges[:, 0], edges[:, 1])).min()))
+    return core.inscribed_radius(np.ascontiguousarray(corners))
 
 
 def outward_normals(corners: FloatArray) -> FloatArray:
@@ -162,31 +160,15 @@ def grown_outline(corners: FloatArray, margin: float) -> FloatArray:
     It holds all points within the margin, with a corner for each corner and two for sharp ones
     (that turn by more than 100 degrees); at corners it reaches at most 1.56 margins away.
     """
-    return grown_outlines(corners, np.array([0, len(corners)]), np.array([margin]))[0]
+    outline = np.ascontiguousarray(corners)
+    return grown_outlines(outline, np.array([0, len(corners)]), np.array([margin]))[0]
 
 
 def grown_outlines(
     vertices: FloatArray, offsets: IntArray, margins: FloatArray
 ) -> tuple[FloatArray, IntArray]:
     """`grown_outline` of each of K flattened outlines by its own margin (K,) [m]."""
-    corners = vertices
-    following = next_corner(offsets)
-    margin = np.repeat(margins, np.diff(offsets))[:, None]
-    edges = corners[following] - corners
-    after = edges / np.hypot(edges[:, 0], edges[:, 1])[:, None]  # (V, 2) directions
-    before = np.empty_like(after)
-    before[following] = after
-    turns = np.arctan2(
-        before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0], (before * after).sum(axis=1)
-    )
-    sharp = turns > np.radians(100.0)
-    reach = np.tan(np.where(sharp, 0.25, 0.5) * turns)[:, None]  # to where the sides meet
-    outward = np.array([[0.0, -1.0], [1.0, 0.0]])  # a direction times this points outwards
-    first = corners + margin * (before @ outward + reach * before)
-    second = corners + margin * (after @ outward - reach * after)
-    keep = np.column_stack([np.ones(len(corners), dtype=np.bool_), sharp & (margin[:, 0] > 0.0)])
-    grown_offsets: IntArray = np.concatenate([[0], np.cumsum(keep.sum(axis=1))])[offsets]
-    return np.stack([first, second], axis=1)[keep], grown_offsets
+    return core.grown_outlines(vertices, offsets, margins)
 
 
 def enclosing_outline(corners: FloatArray) -> FloatArray:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import time
+from functools import cached_property
 
 import numpy as np
 
+from pushplan.core import motion as core
 from pushplan.world.checks import expect
 from pushplan.world.plan import Plan, PlanResult, PlanStats, PlanStatus
-from pushplan.world.polyline import turn_acceleration
 from pushplan.world.scene import World
 from pushplan.world.stop import AnyOf, Stop, StopCheck, check_rules, wants_own_budget
 
@@ -37,6 +38,7 @@ class PlanningCall:
         scene = expect("world", world, World)
         given, generator = check_rules(stop, rng)
         self.rng = np.random.default_rng(0) if generator is None else generator
+        self._has_rng = generator is not None
         own = wants_own_budget(given)
         self.has_rule = not own
         """True if a rule of the caller takes the place of the planner's own budget."""
@@ -49,6 +51,11 @@ class PlanningCall:
     def arm(self) -> None:
         """Start the stop rule; again after what a process does in its first call only."""
         self.check: StopCheck = _never if self._rule is None else self._rule.start()
+
+    @cached_property
+    def seed(self) -> int:
+        """The seed of planners that draw their numbers in the core; 0 without a generator."""
+        return int(self.rng.integers(2**32)) if self._has_rng else 0
 
     @property
     def elapsed(self) -> float:
@@ -83,7 +90,7 @@ class PlanningCall:
         """
         robot = self.world.robot
         if plan is not None and not robot.can_stop:
-            fastest = turn_acceleration(plan.turn_rates[:-1], np.diff(plan.times))
+            fastest = core.turn_acceleration(plan.turn_rates, plan.times)
             if fastest > robot.max_turn_acceleration * (1.0 + _ROUNDING):
                 status = PlanStatus.PATH_ONLY
         stats = PlanStats(self.elapsed, first_solution_s, iterations, nodes, detail)

@@ -48,14 +48,3 @@ def goes_back(poses: FloatArray, size: float) -> BoolArray:
     headings = poses[:-1, 2]
     back = moves[:, 0] * np.cos(headings) + moves[:, 1] * np.sin(headings) < -1e-3 * size
     return np.append(back, back[-1:] if len(back) else [False])
-
-
-def turn_acceleration(turn_rates: FloatArray, durations: FloatArray) -> float:
-    """The greatest change of turn rate between two steps, each of which takes half of it [rad/s²].
-
-    Args:
-        turn_rates: (N,) of each step [rad/s].
-        durations: (N,) of each step [s].
-    """
-    takes = np.maximum(0.5 * (durations[1:] + durations[:-1]), 1e-300)
-    return float((np.abs(np.diff(turn_rates)) / takes).max(initial=0.0))

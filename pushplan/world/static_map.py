@@ -4,21 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pushplan.core import geometry as core
 from pushplan.errors import InvalidInputError
 from pushplan.world.checked_fields import CheckedFields, Shape
 from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, array, checked_bounds, frozen
 from pushplan.world.convex_shapes import shapes_of
 from pushplan.world.occupancy_grid import occupancy_polygons, occupied_cells
-from pushplan.world.outline import flatten, listed, outline_boxes
-
-CAP_CORNERS = 9
-"""Corners of each half circle where a thick segment is turned into a polygon."""
+from pushplan.world.outline import flatten, listed, outline_boxes, unflatten
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,17 +133,13 @@ class StaticMap(ArrayRecord, CheckedFields):
         1.6 % of the radius too large at the caps and nowhere too small; one of radius 0 becomes
         a millionth of the map thick.
         """
-        thin = 5e-7 * float((self.bounds[2:] - self.bounds[:2]).max())
-        ends = [
-            capsule(line[:2], line[2:], max(float(radius), thin))
-            for line, radius in zip(self.segments, self.radii, strict=True)
-        ]
-        return (*self.polygons, *ends)
+        return unflatten(*self.packed)
 
     @cached_property
     def packed(self) -> tuple[FloatArray, IntArray]:
         """(V, 2) corners of all convex parts [m], and (S + 1,) where each part starts."""
-        return flatten(self.convex_parts)
+        vertices, offsets = core_map(self).parts
+        return frozen(vertices), frozen(offsets)
 
     @cached_property
     def boxes(self) -> FloatArray:
@@ -157,14 +151,7 @@ def _parts(polygons: Sequence[Any]) -> list[FloatArray]:
     return [part for parts in shapes_of("static.polygons", polygons) for part in parts]
 
 
-def capsule(a: FloatArray, b: FloatArray, radius: float) -> FloatArray:
-    """Circumscribed convex polygon of the points within ``radius`` of the segment a-b."""
-    along = b - a
-    heading = 0.0
-    if along.any():  # a difference of negative zeros would point backwards
-        heading = float(np.arctan2(along[1], along[0]))
-    # corners of a circumscribed circle lie between its points of tangency
-    step = np.pi / CAP_CORNERS
-    angles = heading - np.pi / 2 + step * (np.arange(CAP_CORNERS) + 0.5)
-    cap = radius / np.cos(step / 2) * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    return frozen(np.ascontiguousarray(np.concatenate([b + cap, a - cap])))
+@lru_cache(maxsize=64)
+def core_map(static: StaticMap) -> core.StaticMap:
+    """The map in the core, which keeps all that searches make of it; for the maps used last."""
+    return core.StaticMap(*flatten(static.polygons), static.segments, static.radii, static.bounds)

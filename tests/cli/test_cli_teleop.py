@@ -15,8 +15,7 @@ import pytest
 from conftest import make_robot
 
 from pushplan.cli import main
-from pushplan.cli.cockpit import drive
-from pushplan.cli.keyboard import GRACE, Keyboard, twist_of
+from pushplan.cli.cockpit import GRACE, Keyboard, drive, twist_of
 from pushplan.envs import make
 from pushplan.metrics import compute
 from pushplan.scenarios import Scenario
@@ -275,7 +274,7 @@ def screen() -> Iterator[str]:
 PERSON = """
 import sys
 from pushplan.cli import main
-from pushplan.envs import rendering, window
+from pushplan.envs import window
 
 class Typed(window.Window):
     frames = 0
@@ -289,7 +288,7 @@ class Typed(window.Window):
             root.after(1500, lambda: root.event_generate("<KeyRelease-Left>"))
             root.after(3000, self.close)
 
-window.Window = rendering.Window = Typed
+window.Window = Typed
 code = main(sys.argv[1:])
 print("frames", Typed.frames)
 sys.exit(code)

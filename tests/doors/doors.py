@@ -247,7 +247,7 @@ DOORS: dict[str, Door] = {
     "gtsp": Door(lambda f: (f / "five.gtsp", _GTSP), _load("pushplan.gtsp.gtsplib:read_gtsp")),
     "tour": Door(
         lambda f: (f / "five.tour", b"NAME: t\nTYPE: TOUR\nDIMENSION: 2\nTOUR_SECTION\n2\n1\n-1\n"),
-        _load("pushplan.gtsp.gtsplib_write:read_tour"),
+        _load("pushplan.gtsp.gtsplib:read_tour"),
     ),
     "training": Door(_training, _load("pushplan.training.policies.config:read_config")),
     "specification": Door(_specification, _read_specification),

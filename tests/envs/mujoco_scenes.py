@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from pushplan.envs.simulators.base import Materials, Solids
+from pushplan.envs.simulators.base import Materials, Solids, Water
 from pushplan.envs.simulators.mujoco_simulator import MujocoSimulator
-from pushplan.envs.simulators.water import Water
 from pushplan.world import (
     Drive,
     GoalDisc,

@@ -11,10 +11,9 @@ from gymnasium.wrappers import FrameStackObservation, TimeLimit
 
 from pushplan.envs import PushEnv, WorkerVectorEnv
 from pushplan.envs.registry import SIMULATORS, TASKS
-from pushplan.envs.simulators.mujoco_options import MujocoOptions
+from pushplan.envs.simulators.mujoco_model import MujocoOptions
 from pushplan.envs.simulators.mujoco_simulator import MujocoSimulator
-from pushplan.envs.simulators.pymunk_options import PymunkOptions
-from pushplan.envs.simulators.pymunk_simulator import PymunkSimulator
+from pushplan.envs.simulators.pymunk_simulator import PymunkOptions, PymunkSimulator
 from pushplan.perception import LidarObservation
 from pushplan.world import PushplanError
 

@@ -28,7 +28,7 @@ from mujoco_scenes import (
 from pushplan.envs import PushEnv
 from pushplan.envs.registry import SIMULATORS
 from pushplan.envs.simulators.mujoco_bodies import drag_damping, planar_rows
-from pushplan.envs.simulators.mujoco_options import MujocoOptions
+from pushplan.envs.simulators.mujoco_model import MujocoOptions
 from pushplan.envs.simulators.mujoco_shapes import as_rectangle, prism_inertia
 from pushplan.envs.simulators.mujoco_simulator import MujocoSimulator
 from pushplan.envs.simulators.mujoco_sleep import rest_cycles

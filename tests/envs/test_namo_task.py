@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from pushplan.envs import make
-from pushplan.envs.tasks.namo import NamoTask
-from pushplan.envs.tasks.namo_layout import LAYOUTS, Opening
-from pushplan.envs.tasks.namo_proof import proves
+from pushplan.envs.tasks.namo import LAYOUTS, NamoTask, Opening, proves
 from pushplan.scenarios import Scenario, suite, suite_names
 from pushplan.world import ScenarioError, UnknownNameError, stream
 

@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 from pushplan.envs import RolloutInteraction, make
-from pushplan.envs.tasks.object_shapes import SHAPES
+from pushplan.envs.tasks.layout import SHAPES
 from pushplan.interaction import QuasiStatic
 from pushplan.scenarios import Scenario
 from pushplan.world import StaticMap

@@ -5,11 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pushplan.core import envs as core
-from pushplan.envs.simulators.base import Materials
-from pushplan.envs.simulators.pymunk_options import PymunkOptions
-from pushplan.envs.simulators.pymunk_simulator import PymunkSimulator
-from pushplan.envs.simulators.water import Water
+from pushplan.envs.simulators.base import Materials, Water
+from pushplan.envs.simulators.pymunk_simulator import PymunkOptions, PymunkSimulator
 from pushplan.geometry import convex_distance
 from pushplan.world import (
     Drive,
@@ -61,23 +58,6 @@ def energy(world):
     movables = world.movables
     speed = (movables.twists[:, :2] ** 2).sum(axis=1)
     return 0.5 * movables.masses @ (speed + movables.twists[:, 2] ** 2 / 6.0)
-
-
-@given(
-    speed=st.floats(1e-3, 3.0), b=st.floats(0.0, 2.0), c=st.floats(0.0, 2.0), h=st.floats(1e-3, 2.0)
-)
-def test_drag_solves_its_equation(speed, b, c, h):
-    """Against many small steps of v' = -(b + c |v|) v."""
-    v = w = speed
-    for _ in range(2000):
-        v -= h / 2000 * (b + c * v) * v
-        w -= h / 2000 * (c + b * w) * w
-    direction = np.array([0.6, -0.8])
-    kept = core.slow_down(
-        np.array([[*(speed * direction), -speed]]), np.ones(1), np.array([[b, c, c, b]]), h
-    )
-    np.testing.assert_allclose(kept[0, :2], v * direction, atol=2e-3 * speed + 1e-12)
-    assert kept[0, 2] == pytest.approx(-w, abs=2e-3 * speed + 1e-12)
 
 
 def test_a_floating_object_coasts_as_drag_says():

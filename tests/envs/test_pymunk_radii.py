@@ -9,8 +9,7 @@ import pytest
 
 from pushplan.envs import PushEnv
 from pushplan.envs.simulators.base import Materials
-from pushplan.envs.simulators.pymunk_options import PymunkOptions
-from pushplan.envs.simulators.pymunk_simulator import PymunkSimulator
+from pushplan.envs.simulators.pymunk_simulator import PymunkOptions, PymunkSimulator
 from pushplan.world import Drive, GoalDisc, Movables, RobotModel, StaticMap, Twist, World
 
 SQUARE = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])

@@ -10,9 +10,8 @@ import pytest
 from benchmarks.accuracy import water_coasting
 from benchmarks.accuracy.water_coasting import coasting
 from pushplan.core import envs as core
-from pushplan.envs.simulators.base import Materials
+from pushplan.envs.simulators.base import Materials, Water
 from pushplan.envs.simulators.pymunk_simulator import PymunkSimulator
-from pushplan.envs.simulators.water import Water
 from pushplan.envs.tasks.ship_ice import PRESETS, ShipIceTask
 from pushplan.world import Movables, Twist, World, stream
 

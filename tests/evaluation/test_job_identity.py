@@ -85,7 +85,7 @@ def test_any_file_of_ours_counts_that_an_episode_may_run_through(package: Path) 
         "evaluation/store/rows.py",
         "evaluation/stress_testing.py",
         "world/seeds.py",
-        "runtime/disturbances.py",
+        "runtime/disturbed_policy.py",
         "control/executors.py",
         "metrics/navigation.py",
         "interaction/weights/ice_network.onnx",

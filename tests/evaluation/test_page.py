@@ -15,8 +15,7 @@ from synthetic_rows import many_rows
 
 from pushplan.cli import main
 from pushplan.evaluation import Job, Results, bench, parse_policy, run_batch
-from pushplan.evaluation.report.page import page_data
-from pushplan.evaluation.report.replays import chosen
+from pushplan.evaluation.report.page import chosen, page_data
 from pushplan.scenarios import suite
 
 api = pytest.importorskip("playwright.sync_api", reason="needs Playwright")

@@ -9,7 +9,7 @@ import pytest
 from pushplan.envs import make
 from pushplan.evaluation import Condition, stress, stress_testing
 from pushplan.evaluation.stress_testing import CONDITIONS, UNDISTURBED
-from pushplan.runtime.disturbances import Disturbances
+from pushplan.runtime.disturbed_policy import Disturbances
 from pushplan.scenarios import Scenario, suite
 from pushplan.world import InvalidInputError, Twist, UnknownNameError
 

@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
 
 import networkx as nx
 import numpy as np
@@ -12,14 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.ops import nearest_points
 
+from pushplan.core import geometry as core
 from pushplan.geometry import (
     Grid,
     VisibilityGraph,
     clearance_field,
-    contours,
     geodesic_field,
     goal_distances,
-    visibility_graph,
+    shortest_path,
 )
 from pushplan.world import GoalDisc, GoalLine, InvalidInputError, StaticMap
 
@@ -34,35 +33,25 @@ U_MAZE = StaticMap.build([], U_WALLS, 0.5, bounds=[0, 0, 15, 15])
 GOAL = GoalDisc(np.array([3.75, 3.75]), 1.86)
 
 
-def forget_maps() -> None:
-    """Empty the caches of maps, which depend on which maps count as large."""
-    for kept in (contours._maker_of, visibility_graph._boxes_of, visibility_graph._covered_sides):
-        kept.cache_clear()
-
-
-@pytest.fixture
-def many_corners(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[int], None]]:
-    """Sets the corners from which on a map is large."""
-
-    def set_to(corners: int) -> None:
-        monkeypatch.setattr(contours, "MANY_CORNERS", corners)
-        monkeypatch.setattr(visibility_graph, "SOME_CORNERS", corners)
-        forget_maps()
-
-    yield set_to
-    forget_maps()
+def with_many_corners(static: StaticMap) -> StaticMap:
+    """A map that counts as large, by a round pillar out of its bounds."""
+    angles = np.linspace(0.0, 2.0 * np.pi, 2300, endpoint=False)
+    circle = 0.1 * np.column_stack([np.cos(angles), np.sin(angles)])
+    pillar = static.bounds[2:] + 1.0 + circle
+    return StaticMap((*static.polygons, pillar), static.segments, static.radii, static.bounds)
 
 
 @pytest.fixture(params=[False, True], ids=["small", "large"])
-def either_size(
-    request: pytest.FixtureRequest,
-    monkeypatch: pytest.MonkeyPatch,
-    many_corners: Callable[[int], None],
-) -> None:
+def either_size(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Searches as on small maps, and with the estimates that large maps need."""
     if request.param:
-        many_corners(0)
-        monkeypatch.setattr(visibility_graph, "_PLAIN_BUDGETS", 0)
+        plain = VisibilityGraph
+
+        def large(static: StaticMap, clearance: float = 0.0) -> VisibilityGraph:
+            return plain(with_many_corners(static), clearance)
+
+        monkeypatch.setitem(globals(), "VisibilityGraph", large)
+        monkeypatch.setattr(shortest_path, "_USUAL", core.Estimates.ALWAYS)
 
 
 def free_space(static: StaticMap, clearance: float) -> shapely.Geometry:
@@ -403,7 +392,8 @@ def test_the_lazy_search_finds_what_the_complete_graph_holds(seed: int) -> None:
         for start in rng.uniform(0, 10, (8, 2)):
             path = VisibilityGraph(static, clearance).to_goal(start, goal)
             expected = complete.path_from(start)
-            longest = 1.05 if contours.MANY_CORNERS == 0 else 1.0 + 3e-7
+            estimated = shortest_path._USUAL is core.Estimates.ALWAYS
+            longest = 1.05 if estimated else 1.0 + 3e-7
             assert (1.0 - 3e-7) * expected.length <= path.length <= longest * expected.length
             if math.isfinite(path.length):
                 assert np.hypot(*np.diff(path.points, axis=0).T).sum() == pytest.approx(path.length)
@@ -428,9 +418,7 @@ def test_a_search_among_ten_thousand_walls_can_be_stopped() -> None:
     assert np.median(np.diff(looks)) < 0.1  # a whole graph takes minutes
 
 
-def test_the_way_out_of_a_crowded_dead_end_is_found_soon(
-    many_corners: Callable[[int], None],
-) -> None:
+def test_the_way_out_of_a_crowded_dead_end_is_found_soon() -> None:
     square = np.array([[0.0, 0.0], [0.5, 0.0], [0.5, 0.5], [0.0, 0.5]])
     wall = [square + np.array([10.0, 0.5 * i]) for i in range(40)]  # but the goal is behind it
     posts = [0.5 * square + 1.2 * np.array([i, j]) for i in range(1, 8) for j in range(2, 16)]
@@ -443,10 +431,13 @@ def test_the_way_out_of_a_crowded_dead_end_is_found_soon(
         return False
 
     found = []
-    for corners in (1_000_000, 100):
-        many_corners(corners)
+    graphs = (
+        VisibilityGraph(static, 0.2, exact=True),
+        VisibilityGraph(with_many_corners(static), 0.2),
+    )
+    for graph in graphs:
         looks.clear()
-        path = VisibilityGraph(static, 0.2).to_goal((9.2, 18.0), goal, stopped)
+        path = graph.to_goal((9.2, 18.0), goal, stopped)
         found.append((path.length, len(looks)))
     (shortest, slow), (length, quick) = found
     assert shortest <= length <= 1.05 * shortest
@@ -467,11 +458,8 @@ def test_goals_on_corners_and_edges_of_the_map_are_reached(bounds: list[float]) 
         assert path.length == pytest.approx(math.dist(start, goal), rel=0.05)
 
 
-def test_that_no_way_leads_to_the_goal_is_found_soon(
-    monkeypatch: pytest.MonkeyPatch, many_corners: Callable[[int], None]
-) -> None:
-    many_corners(0)
-    monkeypatch.setattr(visibility_graph, "_PLAIN_BUDGETS", 0)
+def test_that_no_way_leads_to_the_goal_is_found_soon(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shortest_path, "_USUAL", core.Estimates.ALWAYS)
     square = np.array([[0.0, 0.0], [0.1, 0.0], [0.1, 0.1], [0.0, 0.1]])
     wall = [square + np.array([7.0, 0.1 * i]) for i in range(100)]
     posts = [square + np.array([0.9 * i, 0.9 * j]) for i in range(1, 7) for j in range(1, 11)]
@@ -486,4 +474,4 @@ def test_that_no_way_leads_to_the_goal_is_found_soon(
 
     path = VisibilityGraph(static).to_goal((0.1, 0.1), GoalDisc((9.8, 9.8), 0.1), stopped)
     assert math.isinf(path.length)
-    assert len(looks) < 200
+    assert len(looks) < 400

@@ -20,7 +20,7 @@ from pushplan.envs import PushEnv
 from pushplan.evaluation import bench, parse_policy, run_episode
 from pushplan.evaluation.run.jobs import JobSettings
 from pushplan.evaluation.run.policy_specs import policy_names
-from pushplan.learned import OnnxPolicy, learned_names, load_policy, onnx_session
+from pushplan.learned import OnnxPolicy, learned_names, load_policy, onnx_policy
 from pushplan.learned.loading import weights_of
 from pushplan.learned.onnx_policy import read_specification
 from pushplan.learned.outputs import ActionSpec, BadOutputError
@@ -313,7 +313,7 @@ class TestHostile:
         self.refused(save(finish(model, maze_specification()), tmp_path / "x"), "be run|not take")
 
     def test_a_network_that_takes_forever(self, tmp_path, monkeypatch):
-        monkeypatch.setattr(onnx_session, "LONGEST_DECISION_S", 0.05)
+        monkeypatch.setattr(onnx_policy, "LONGEST_DECISION_S", 0.05)
         side = np.zeros((700, 700), np.float32)
         nodes = [helper.make_node("MatMul", ["side", "side"], ["m0"])]
         nodes += [helper.make_node("MatMul", [f"m{i}", "side"], [f"m{i + 1}"]) for i in range(400)]

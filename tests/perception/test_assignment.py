@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
-from pushplan.perception.assignment import assign
+from pushplan.perception.object_tracker import assign
 
 
 @given(st.integers(0, 10**6), st.integers(1, 25), st.integers(1, 25), st.floats(0.02, 0.6))

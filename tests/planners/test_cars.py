@@ -118,7 +118,7 @@ def test_closed_loops_arrive_within_the_turning_radius(simulator, policy, kind):
         arrived = world.goal.reached_by(after.robot_pose)
         turned = abs(math.remainder(after.robot_pose[2] - before.robot_pose[2], math.tau))
         moved = math.dist(after.robot_pose[:2], before.robot_pose[:2])
-        slip = 1e-9 if simulator is PymunkSimulator else 0.025  # its wheels lag where it stops
+        slip = 1e-9 if simulator is PymunkSimulator else 0.04  # its wheels lag where it stops
         assert 1.009 * turned <= 1.001 * moved + slip
     assert arrived
 

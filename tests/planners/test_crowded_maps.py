@@ -10,8 +10,8 @@ from conftest import SQUARE, quickest
 from plan_checks import check_plan
 from random_worlds import posts
 
-from pushplan.geometry.contours import prepare_contours
-from pushplan.motion.coarse_path import coarse_path
+from pushplan.geometry import VisibilityGraph
+from pushplan.motion.coarse_path import reachable
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.keyholes import KeyholeConfig, suits_keyholes
 from pushplan.planners import make_planner
@@ -45,14 +45,23 @@ class Looks(Stop):
         return check
 
 
+def looks_at_a_path(static: StaticMap, clearance: float) -> int:
+    """How often the stop rule is asked while a short path is found."""
+    looks = Looks()
+    check = looks.start()
+    start = static.bounds[:2]
+    VisibilityGraph(static, clearance).to_goal(
+        start, GoalDisc(start, 0.1), lambda: check(0, np.inf)
+    )
+    return looks.count
+
+
 def test_what_is_made_of_a_large_map_is_made_in_pieces():
     looks, world = Looks(), posts(3000, seed=12)
     assert make_planner("skeleton").plan(world, stop=looks).status is PlanStatus.PATH_ONLY
     assert looks.count >= 12
-    looks = Looks()
-    check = looks.start()
-    assert prepare_contours(world.static, 0.123, lambda: check(0, np.inf))
-    assert looks.count >= 9
+    first = looks_at_a_path(world.static, 0.123)
+    assert first >= looks_at_a_path(world.static, 0.123) + 9
 
 
 @pytest.mark.parametrize("name", PLANNERS)
@@ -64,21 +73,22 @@ def test_a_call_ends_at_the_look_that_fires(name):
         assert looks.count <= last + 8  # the ends of loops look at it once more each
 
 
-def test_the_coarse_path_looks_while_it_goes_through_the_cells():
-    looks = Looks()
+@pytest.mark.parametrize(("last", "count"), [(np.inf, 5), (2, 2)])
+def test_the_look_for_a_way_around_walls_is_one_in_pieces(last, count):
+    looks = Looks(last)
     check = looks.start()
-    whole = coarse_path(posts(300, seed=1), 1.0, lambda: check(0, np.inf))
-    assert len(whole) and looks.count >= 5
-    assert not len(coarse_path(posts(300, seed=1), 1.0, lambda: True))
+    world = replace(posts(300, seed=1), robot=box_delivery_robot())  # as wide as some cells
+    assert reachable(world, lambda: check(0, np.inf))  # as far as it knows
+    assert count <= looks.count <= last
 
 
 def test_what_was_made_before_a_stop_is_kept_for_the_next_call():
     world, planner = posts(3000, seed=7), make_planner("straight")
     clearance = world.robot.circumscribed_radius
-    assert not prepare_contours(world.static, clearance, lambda: True)
     for _ in range(10):
         planner.plan(world, stop=Looks(last=4))
-    assert prepare_contours(world.static, clearance, lambda: True)
+    later = looks_at_a_path(world.static, clearance)
+    assert looks_at_a_path(world.static, 1.001 * clearance) >= later + 9
 
 
 def test_namo_looks_while_it_makes_its_grid():

@@ -13,8 +13,7 @@ from plan_checks import check_plan
 from pushplan.control import MpcTracker, PathFollower, Progress, PurePursuit
 from pushplan.geometry.transforms import arc_step
 from pushplan.planners import PlanFollower, make_planner, make_policy
-from pushplan.runtime.disturbances import Disturbances
-from pushplan.runtime.disturbed_policy import DisturbedPolicy
+from pushplan.runtime.disturbed_policy import Disturbances, DisturbedPolicy
 from pushplan.world import (
     Drive,
     InvalidInputError,

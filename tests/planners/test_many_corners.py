@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import subprocess
 import sys
 import time
@@ -12,7 +11,6 @@ import pytest
 import shapely
 from conftest import SQUARE
 
-from pushplan.motion import coarse_path
 from pushplan.planners import make_planner, planner_names
 from pushplan.world import Deadline, GoalDisc, Movables, StaticMap, World
 from pushplan.world.outline import enclosing_outline
@@ -96,20 +94,3 @@ def test_an_object_of_many_corners_stays_the_same_object() -> None:
         world.robot, world.robot_pose, world.static, whole.holding_fixed([False, True]), world.goal
     )
     assert max(map(len, fixed.for_planning().static.polygons)) == 1000
-
-
-def test_a_wall_that_covers_much_takes_several_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
-    static = StaticMap.build([circle(900) + 10.0], WALLS, 0.05)
-    terms = ((0.2, math.inf), (0.4, 2.0))
-    made, looks = [], []
-    for cells in (5_000, 10**9):
-        monkeypatch.setattr(coarse_path, "_PIECE_CELLS", cells)
-        looks.append(0)
-
-        def look() -> bool:
-            looks[-1] += 1
-            return False
-
-        made.append(coarse_path._WallWeights(static, 0.1, terms).make(look))
-    assert np.array_equal(*made)
-    assert looks[0] > 50 and looks[1] < 5

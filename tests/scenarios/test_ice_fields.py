@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from pushplan.core import scenarios as core
 from pushplan.scenarios import FloeSizes, generate_ice
-from pushplan.scenarios.rough_floes import roughened
+from pushplan.scenarios.ice_generator import roughened
 from pushplan.world import InvalidInputError, ScenarioError, stream
 from pushplan.world.outline import convex_outline
 

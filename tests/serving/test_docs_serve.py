@@ -14,9 +14,9 @@ import pytest
 from served import HELLO, Raw, maze, served
 
 from pushplan.metrics import compute
-from pushplan.serving import ServerLimits, scale, world_feed
-from pushplan.serving.episodes import SETTINGS
+from pushplan.serving import ServerLimits, world_feed
 from pushplan.serving.messages import REQUESTS
+from pushplan.serving.session import SETTINGS
 from pushplan.world import Episode, world_to_dict
 
 ROOT = Path(__file__).parents[2]
@@ -91,6 +91,6 @@ def test_the_page_names_every_request_key_setting_and_limit():
     assert (limits.clients, limits.message_bytes, limits.message_s, limits.idle_s) == (
         *(8, 4_000_000, 10.0, 600.0),
     )
-    assert f"{world_feed.MAX_OBJECTS:,}" in PAGE and f"{scale.WIDEST:,.0f} radii" in PAGE
-    assert (scale.LEAST, scale.HEAVIEST, scale.FASTEST) == (1e-9, 1e12, 1e6)
-    assert scale.FARTHEST == 1e6 and HELLO["protocol"] in PAGE
+    assert f"{world_feed.MAX_OBJECTS:,}" in PAGE and f"{world_feed.WIDEST:,.0f} radii" in PAGE
+    assert (world_feed.LEAST, world_feed.HEAVIEST, world_feed.FASTEST) == (1e-9, 1e12, 1e6)
+    assert world_feed.FARTHEST == 1e6 and HELLO["protocol"] in PAGE

@@ -12,10 +12,10 @@ import pytest
 from served import HELLO, PolicyClient, Raw, ServeError, Still, maze, maze_dict, served
 
 from pushplan.evaluation import JobSettings, run_episode
-from pushplan.planners import make_policy
+from pushplan.planners import make_planner, make_policy
 from pushplan.scenarios import suite
 from pushplan.serving import PROTOCOL, PolicyServer
-from pushplan.world import Twist, WheelSpeeds, World, stream, world_to_dict
+from pushplan.world import MaxIterations, Twist, WheelSpeeds, World, stream, world_to_dict
 
 STEP = 0.5  # [s]
 
@@ -84,6 +84,18 @@ def test_the_same_seed_and_worlds_give_the_same_commands_to_the_bit(name, steps,
         assert through(server.address, world, 3, steps, whole=True) == wanted
         if name == "random":
             assert through(server.address, world, 4, steps) != wanted
+
+
+def test_a_served_plan_is_that_of_the_planner_with_the_same_seed(tmp_path):
+    world, stop = maze(), MaxIterations(150)
+    planned = make_planner("push-aware").plan(world, stop=stop, rng=stream(3, "policy")).plan
+    assert planned is not None
+    policy = lambda: make_policy("push-aware", stop=stop)  # noqa: E731
+    with served(policy, tmp_path) as server, PolicyClient(server.address, 60.0) as client:
+        client.reset(world_to_dict(world), 3)
+        plan = client.act(world=world_to_dict(world), with_plan=True)["plan"]
+    for name in ("times", "poses", "speeds", "turn_rates"):
+        assert plan[name] == getattr(planned, name).tolist()
 
 
 def test_two_clients_at_once_do_what_each_does_alone(tmp_path):

@@ -11,6 +11,7 @@ from pushplan.envs.simulators.mujoco_simulator import MujocoSimulator
 from pushplan.envs.simulators.pymunk_simulator import PymunkSimulator
 from pushplan.planners import make_planner
 from pushplan.world import (
+    FirstSolution,
     GoalDisc,
     InvalidInputError,
     MaxIterations,
@@ -89,7 +90,8 @@ def test_plans_drive_a_peg_between_the_tines_and_touch_nothing():
     static = StaticMap.build(polygons=[peg], bounds=[0, 0, 8, 6])
     goal = GoalDisc([5.45, 3.0], 0.04)
     world = between_tines(static=static, goal=goal, movables=Movables.empty())
-    result = make_planner("kinodynamic-rrt").plan(world, stop=MaxIterations(3000))
+    rule = FirstSolution() | MaxIterations(60_000)
+    result = make_planner("kinodynamic-rrt").plan(world, stop=rule)
     assert result.status is PlanStatus.SOLVED
     wall = shapely.Polygon(peg)
     poses = result.plan.poses

@@ -1,11 +1,16 @@
-// Division and rounding to whole numbers. Division rounds down: remainders are never negative.
+// Constants, and rounding to whole numbers. Division rounds down: remainders are never negative.
 #pragma once
 
 #include <cmath>
+#include <limits>
+#include <numbers>
 
 #include "pushplan/array.hpp"
 
 namespace pushplan {
+
+inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
+inline constexpr double kTurn = 2.0 * std::numbers::pi;  // [rad]
 
 /// The remainder of `a` by a positive `b`, in [0, b).
 inline double floor_mod(double a, double b) {
@@ -20,9 +25,6 @@ constexpr Index floor_mod(Index a, Index b) {
   const Index rest = a % b;
   return rest < 0 ? rest + b : rest;
 }
-
-/// The quotient by a positive `b`, rounded down.
-constexpr Index floor_div(Index a, Index b) { return (a - floor_mod(a, b)) / b; }
 
 // Without the calls that std::floor and std::ceil are on old processors.
 

@@ -11,6 +11,9 @@ namespace pushplan {
 /// Numbers and indices as arrays hold them.
 using Index = std::int64_t;
 
+/// An index as the containers of the standard library take it.
+constexpr std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+
 /// A row-major array of `Rank` dimensions, not owned. `a(i, j)` is an element and `a.row(i)` the
 /// part with that first index. Indices are not checked.
 template <class T, std::size_t Rank>

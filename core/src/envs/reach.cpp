@@ -11,8 +11,6 @@ namespace {
 
 constexpr int kAdvances = 64;  // looks at the gap at most
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 double distance(const Pose& a, const Pose& b) { return std::hypot(a.x - b.x, a.y - b.y); }
 
 }  // namespace

@@ -1,12 +1,9 @@
 #include "pushplan/geometry/convex.hpp"
 
 #include <cmath>
-#include <limits>
 
 namespace pushplan {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// The outward edge normal of `a` along which `b` is farthest away, and how far [m].
 struct Gap {

@@ -17,8 +17,6 @@ namespace {
 constexpr double kRounding = 1e-12;  // fraction of the area of all pieces that counts as none
 constexpr std::size_t kFew = 8;      // corners up to which a part counts as small
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 struct Part {
   std::vector<Vec2> corners;
   double area;  // of its pieces, and of what mergers have added [m^2]

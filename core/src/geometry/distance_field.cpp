@@ -1,13 +1,11 @@
 #include "pushplan/geometry/distance_field.hpp"
 
 #include <algorithm>
-#include <limits>
 #include <vector>
 
 namespace pushplan {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kSteepest = 1.5;  // difference of four neighbouring cells without a wall [steps]
 
 /// A marked cell seen from a line of cells.

@@ -10,15 +10,12 @@
 namespace pushplan {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kMaxCells = 1'000'000.0;
 constexpr double kMargin = 0.1;         // by which a side must be inside of an outline [cells]
 constexpr double kOverlap = 0.05;       // by which outlines overlap that close a passage [cells]
 constexpr double kLongest = 1.0198039;  // greatest ratio of a chamfer distance to the length
 constexpr double kSlack = 3.0;  // of a distance, from places in cells to their centres [cells]
 constexpr std::int32_t kUnreached = std::numeric_limits<std::int32_t>::max();
-
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 /// The part of a horizontal line that is inside of a convex outline.
 struct Chord {

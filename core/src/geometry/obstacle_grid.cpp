@@ -2,19 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "pushplan/arithmetic.hpp"
 
 namespace pushplan {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr Index kCellsPerObstacle = 4;
 constexpr Index kMaxCells = 65'536;
 constexpr double kRounding = 1e-6;  // it may put a point into the next cell [cells]
-
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 }  // namespace
 

@@ -2,16 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "pushplan/geometry/convex.hpp"
 
 namespace pushplan {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 /// True if the segments p-q and a-b cross or are closer than the root of `reach_squared`.
 bool segments_closer(Vec2 p, Vec2 q, Vec2 a, Vec2 b, double reach_squared) {
@@ -86,13 +81,6 @@ bool line_of_sight(Vec2 p, Vec2 q, const Obstacles& obstacles, double margin) {
     if (crosses_obstacle(p, q, obstacles, k, margin)) return false;
   }
   return true;
-}
-
-void free_points(std::span<const Vec2> points, const Obstacles& obstacles, const Box& box,
-                 double gap, std::span<bool> keep) {
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    keep[i] = box.contains(points[i], gap) && obstacle_distance(points[i], obstacles) >= gap;
-  }
 }
 
 }  // namespace pushplan

@@ -2,14 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace pushplan {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 Vec2 nearest_in_disc(Vec2 p, const Disc& disc) {
   const Vec2 centre = disc.centre;
@@ -51,6 +46,23 @@ Vec2 nearest_in_polygon(Vec2 p, Polygon polygon) {
   return inside ? p : nearest;
 }
 
+/// Adds the points where segments enter a circle, or where they leave it with side 1.
+void add_crossings(const Disc& disc, std::span<const Segment> sides, double side,
+                   std::vector<Vec2>& found) {
+  for (const auto& [from, to] : sides) {
+    const double dx = to.x - from.x;
+    const double dy = to.y - from.y;
+    const double a = std::max(dx * dx + dy * dy, 1e-300);
+    const double ox = from.x - disc.centre.x;
+    const double oy = from.y - disc.centre.y;
+    const double b = (dx * ox + dy * oy) / a;
+    const double square = b * b - (ox * ox + oy * oy - disc.radius * disc.radius) / a;
+    if (square < 0.0) continue;
+    const double t = -b + side * std::sqrt(square);
+    if (t >= 0.0 && t <= 1.0) found.push_back({from.x + t * dx, from.y + t * dy});
+  }
+}
+
 }  // namespace
 
 Vec2 nearest_in_region(Index k, Vec2 p, const Regions& regions) {
@@ -88,6 +100,34 @@ std::vector<Vec2> segment_crossings(std::span<const Segment> first,
       const double u = ((a.x - p.x) * dy - (a.y - p.y) * dx) / across;
       if (t < 0.0 || t > 1.0 || u < 0.0 || u > 1.0) continue;
       found.push_back({p.x + t * dx, p.y + t * dy});
+    }
+  }
+  return found;
+}
+
+std::vector<Vec2> region_crossings(const Regions& regions, std::span<const Segment> sides) {
+  std::vector<Vec2> found;
+  const auto add = [&](const Segment& edge) {
+    const std::vector<Vec2> crossings = segment_crossings({&edge, 1}, sides);
+    found.insert(found.end(), crossings.begin(), crossings.end());
+  };
+  for (const Disc& disc : regions.discs) {
+    add_crossings(disc, sides, -1.0, found);
+    add_crossings(disc, sides, 1.0, found);
+  }
+  double farthest = 0.0;
+  for (const auto& [from, to] : sides) {
+    farthest =
+        std::max({farthest, std::abs(from.x), std::abs(from.y), std::abs(to.x), std::abs(to.y)});
+  }
+  for (const auto& [p, n] : regions.half_planes) {
+    const double span = 2.0 * farthest + 1.0 + std::hypot(p.x, p.y);
+    add({{p.x - span * n.y, p.y + span * n.x}, {p.x + span * n.y, p.y - span * n.x}});
+  }
+  for (Index k = 0; k < regions.polygons.count(); ++k) {
+    const Polygon polygon = regions.polygons[k];
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+      add({polygon[i], polygon[next_corner(polygon, i)]});
     }
   }
   return found;

@@ -2,12 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace pushplan {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kTouch = 1e-6;  // a viewpoint this close to a side or a corner is on it [px]
 constexpr Index kInside = -1;
 

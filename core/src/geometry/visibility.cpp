@@ -1,35 +1,32 @@
 #include "pushplan/geometry/visibility.hpp"
 
 #include <cmath>
-#include <limits>
 
 namespace pushplan {
-namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
-}  // namespace
-
-VisiblePairs visible_pairs(const Bends& bends, const Obstacles& obstacles, double gap) {
-  VisiblePairs found;
-  for (std::size_t i = 0; i < bends.points.size(); ++i) {
-    const Vec2 p = bends.points[i];
-    for (std::size_t j = i + 1; j < bends.points.size(); ++j) {
-      const Vec2 q = bends.points[j];
+BendGraph::BendGraph(const Bends& every, const Obstacles& obstacles, const Box& box, double gap) {
+  for (std::size_t i = 0; i < every.points.size(); ++i) {
+    const Vec2 p = every.points[i];
+    if (!box.contains(p, gap) || obstacle_distance(p, obstacles) < gap) continue;
+    points_.push_back(p);
+    incoming_.push_back(every.incoming[i]);
+    outgoing_.push_back(every.outgoing[i]);
+  }
+  lines_.resize(points_.size());
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const Vec2 p = points_[i];
+    for (std::size_t j = i + 1; j < points_.size(); ++j) {
+      const Vec2 q = points_[j];
       const double dx = q.x - p.x;
       const double dy = q.y - p.y;
-      if (!bends.tangent({dx, dy}, i, gap) || !bends.tangent({-dx, -dy}, j, gap)) continue;
+      if (!bends().tangent({dx, dy}, i, gap) || !bends().tangent({-dx, -dy}, j, gap)) continue;
       if (!line_of_sight(p, q, obstacles, gap)) continue;
-      found.pairs.push_back({static_cast<Index>(i), static_cast<Index>(j)});
-      found.lengths.push_back(std::hypot(dx, dy));
+      lines_[i].push_back({static_cast<Index>(j), std::hypot(dx, dy)});
+      lines_[j].push_back({static_cast<Index>(i), std::hypot(dx, dy)});
     }
   }
-  return found;
 }
 
-void relax(const Arcs& arcs, std::span<double> distances, std::span<Index> parents) {
+void BendGraph::relax(std::span<double> distances, std::span<Index> parents) const {
   std::vector<char> done(distances.size(), 0);
   for (std::size_t round = 0; round < distances.size(); ++round) {
     Index node = -1;
@@ -42,15 +39,25 @@ void relax(const Arcs& arcs, std::span<double> distances, std::span<Index> paren
     }
     if (node < 0) return;
     done[at(node)] = 1;
-    for (Index e = arcs.starts[at(node)]; e < arcs.starts[at(node) + 1]; ++e) {
-      const std::size_t other = at(arcs.ends[at(e)]);
-      const double length = best + arcs.lengths[at(e)];
-      if (length < distances[other]) {
-        distances[other] = length;
-        parents[other] = node;
+    for (const auto& [to, step] : lines_[at(node)]) {
+      const double length = best + step;
+      if (length < distances[at(to)]) {
+        distances[at(to)] = length;
+        parents[at(to)] = node;
       }
     }
   }
+}
+
+std::vector<double> BendGraph::distances() const {
+  const std::size_t count = points_.size();
+  std::vector<double> between(count * count, kInfinity);
+  std::vector<Index> unused(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    between[k * count + k] = 0.0;
+    relax(std::span(between).subspan(k * count, count), unused);
+  }
+  return between;
 }
 
 GoalLeg goal_leg(Vec2 p, const GoalScene& scene) {

@@ -2,15 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace pushplan {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr Index kLineWork = 8;  // of a line tested or an expansion begun [corners looked at]
-
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 }  // namespace
 
@@ -27,19 +23,21 @@ VisibilitySearch::VisibilitySearch(Vec2 start, const Corners& corners, const Goa
       bounds_(corners.middles.size()),
       lengths_(corners.points.size(), kInfinity),
       parents_(corners.points.size(), kStart) {
-  for (std::size_t k = 0; k < bounds_.size(); ++k) {
-    const double half = std::hypot(corners.halves[k].x, corners.halves[k].y);
-    bounds_[k] = region_distance(corners.middles[k], scene.regions) - half;
-    if (estimate == nullptr) continue;
-    double least = kInfinity;
-    for (std::size_t j = at(corners.first[k]); j < at(corners.first[k + 1]); ++j) {
-      least = std::min(least, estimate->from(corners.points[j]));
-    }
-    bounds_[k] = std::max(bounds_[k], least);
-  }
-  if (estimate != nullptr && std::isinf(estimate->from(start))) return;  // no way leads there
   heap_.reserve(8 * corners.points.size() + 64);
-  expand(kStart, 0.0, -kInfinity);
+}
+
+/// Bounds the way from any corner of the next obstacle; returns how much work that was.
+Index VisibilitySearch::bound_next() {
+  const std::size_t k = bounded_++;
+  const double half = std::hypot(corners_.halves[k].x, corners_.halves[k].y);
+  bounds_[k] = region_distance(corners_.middles[k], scene_.regions) - half;
+  if (estimate_ == nullptr) return 0;
+  double least = kInfinity;
+  for (std::size_t j = at(corners_.first[k]); j < at(corners_.first[k + 1]); ++j) {
+    least = std::min(least, estimate_->from(corners_.points[j]));
+  }
+  bounds_[k] = std::max(bounds_[k], least);
+  return corners_.first[k + 1] - corners_.first[k];
 }
 
 Vec2 VisibilitySearch::place(Index node) const {
@@ -142,6 +140,13 @@ void VisibilitySearch::expand(Index node, double length, double low) {
 
 VisibilitySearch::Outcome VisibilitySearch::run(Index budget) {
   const auto expansion = static_cast<Index>(corners_.middles.size()) + kLineWork;
+  while (bounded_ < bounds_.size() && budget > 0) budget -= bound_next();
+  if (budget <= 0) return Outcome::kPaused;
+  if (!begun_) {
+    begun_ = true;
+    const bool leads_there = estimate_ == nullptr || !std::isinf(estimate_->from(start_));
+    if (leads_there) expand(kStart, 0.0, -kInfinity);
+  }
   while (budget > 0) {
     if (heap_.empty()) return Outcome::kExhausted;
     std::pop_heap(heap_.begin(), heap_.end());

@@ -9,18 +9,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <span>
 #include <vector>
 
+#include "pushplan/arithmetic.hpp"
 #include "pushplan/array.hpp"
 #include "pushplan/gtsp/problem.hpp"
 
 namespace pushplan::gtsp {
-
-inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-inline std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 /// Fills `out[w]` with the least of `values[v] + costs(from + v, to + w)` over v, for w below
 /// `n_to`, four columns at a time. Up to `kSpare` numbers past `n_to` are written too and mean

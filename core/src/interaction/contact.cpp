@@ -2,12 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace pushplan {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kBelowZero = -5e-324;  // the greatest number less than 0
 
 std::size_t next(Polygon polygon, std::size_t i) { return i + 1 < polygon.size() ? i + 1 : 0; }

@@ -4,12 +4,6 @@
 #include <cmath>
 
 namespace pushplan {
-namespace {
-
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
-}  // namespace
-
 IceContacts::IceContacts(const IceBodies& bodies, const IceSettings& settings)
     : bodies_(bodies), settings_(settings), most_points_(24 * at(bodies.floes.parts.count()) + 64) {
   hull_.resize(bodies.hull.vertices.size());

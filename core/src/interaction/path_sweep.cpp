@@ -8,8 +8,6 @@
 namespace pushplan {
 namespace {
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 /// Some of the floes, in memory of their own.
 class ChosenFloes {
  public:

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
 
 #include "separation.hpp"
 
@@ -11,9 +9,6 @@ namespace pushplan {
 namespace {
 
 constexpr double kNearby = 3.0;  // reach beyond the robot's within which objects are nearby [radii]
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 /// Whether the square around a disc overlaps a box.
 bool reaches(const Box& box, double x, double y, double r) {
@@ -192,7 +187,6 @@ double QuasiStatic::resolve(const Pose& from, const Pose& to, std::span<Pose> po
 
 bool QuasiStatic::advance(const Pose& robot_from, const Pose& robot_to, std::span<Pose> poses,
                           std::span<double> lengths) {
-  constexpr double kTurn = 2.0 * std::numbers::pi;
   const double dx = robot_to.x - robot_from.x;
   const double dy = robot_to.y - robot_from.y;
   double turn = robot_to.theta - robot_from.theta;

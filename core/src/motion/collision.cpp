@@ -103,6 +103,7 @@ double CollisionChecker::depth(const Pose& pose) {
   transform(pose, footprint_.parts.vertices, corners_.data());
   const Polygons placed{corners_, footprint_.parts.offsets};
   for (Index s = 0; s < obstacles_.count(); ++s) {
+    if (!reaches(obstacles_.boxes[static_cast<std::size_t>(s)], pose, footprint_.radius)) continue;
     for (Index part = 0; part < placed.count(); ++part) {
       deepest = std::max(deepest, convex_penetration(placed[part], obstacles_.polygons[s]).depth);
     }

@@ -2,16 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
 
 #include "pushplan/arithmetic.hpp"
 
 namespace pushplan {
 namespace {
-
-constexpr double kTurn = 2.0 * std::numbers::pi;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// Squares are compared with this, since rounding may take a zero below zero.
 constexpr double kLeastSquare = -1e-9;

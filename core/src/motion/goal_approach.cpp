@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
+#include <deque>
 #include <numbers>
 
 #include "pushplan/motion/recovery.hpp"
@@ -12,7 +12,6 @@
 namespace pushplan {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Ways before the end of a path at which a curve may leave it: first the short ones [radii]
 constexpr std::array kNear{0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0};
 constexpr std::array kFar{6.0, 9.0, 13.0, kInfinity};
@@ -21,6 +20,8 @@ constexpr double kRoom = 1.1;       // free disc in which a robot turns [circums
 constexpr double kRunUp = 12.0;     // longest straight way into a goal [circumscribed radii]
 constexpr double kRunUpStep = 0.25;
 constexpr double kMostPoses = 1e6;  // of an end
+constexpr int kMostBoxes = 500;     // boxes of poses that are checked at most
+constexpr double kWithin = 0.9;     // part of the tolerances that is used
 
 /// A way to the goal from a pose of the path.
 struct Curve {
@@ -64,7 +65,57 @@ std::vector<Curve> curves_from(std::span<const double> back, std::span<const Pos
   return curves;
 }
 
+/// Poses up to so far off a pose.
+struct PoseBox {
+  Pose middle;
+  double half;  // along x and y [m]
+  double turn;  // to either side [rad]
+};
+
+// Middles of the parts of a box that is halved along x and y, or of its turns
+constexpr std::array kQuarters{Pose{-1.0, -1.0, 0.0}, Pose{-1.0, 1.0, 0.0}, Pose{1.0, -1.0, 0.0},
+                               Pose{1.0, 1.0, 0.0}};
+constexpr std::array kHalves{Pose{0.0, 0.0, -1.0}, Pose{0.0, 0.0, 1.0}};
+
 }  // namespace
+
+// Boxes of poses are halved, beginning with that of all tolerances, until the robot fits in the
+// middle of one. A box is left out where no motion within it gets the footprint out of something.
+std::optional<GoalRegion> fitting(const GoalRegion& goal, const Polygons& footprint, double size,
+                                  const ConvexObstacles& walls) {
+  CollisionChecker checker({footprint, size}, walls);
+  std::deque<PoseBox> boxes{{{0.0, 0.0, 0.0}, goal.radius, goal.heading_tolerance}};
+  for (int looked = 0; looked < kMostBoxes; ++looked) {
+    if (boxes.empty()) return std::nullopt;
+    auto [off, half, turn] = boxes.front();
+    boxes.pop_front();
+    const Pose pose{goal.point.x + off.x, goal.point.y + off.y, goal.heading + off.theta};
+    const double away = std::hypot(off.x, off.y);
+    const double aside = std::abs(off.theta);
+    const double within = std::max(away / goal.radius, aside / goal.heading_tolerance);
+    if (within <= kWithin && checker.is_free(pose)) {
+      GoalRegion fitted = goal;
+      fitted.point = {pose.x, pose.y};
+      fitted.heading = pose.theta;
+      fitted.radius -= away;
+      fitted.heading_tolerance -= aside;
+      return fitted;
+    }
+    const double reach = std::numbers::sqrt2 * half;
+    const Pose inside{std::clamp(pose.x, walls.bounds.x_min, walls.bounds.x_max),
+                      std::clamp(pose.y, walls.bounds.y_min, walls.bounds.y_max), pose.theta};
+    const double outside = std::hypot(inside.x - pose.x, inside.y - pose.y);
+    if (std::max(outside, away - goal.radius) > reach) continue;
+    if (checker.depth(inside) > reach + size * turn) continue;
+    const bool across = reach > size * turn;
+    (across ? half : turn) *= 0.5;
+    for (const Pose& step : across ? std::span<const Pose>(kQuarters) : kHalves) {
+      const Pose to{off.x + half * step.x, off.y + half * step.y, off.theta + turn * step.theta};
+      boxes.push_back({to, half, turn});
+    }
+  }
+  return goal;
+}
 
 Pose behind(const GoalRegion& goal, double length) {
   return {goal.point.x - length * std::cos(goal.heading),
@@ -133,6 +184,16 @@ std::optional<PathEnd> path_end(const GoalRegion& goal, std::span<const Pose> pa
     }
   }
   return std::nullopt;
+}
+
+std::optional<PathEnd> end_at_pose(const GoalRegion& goal, std::span<const Pose> path,
+                                   const EndTurns& turns, bool reverses, const Footprint& footprint,
+                                   double size, const ConvexObstacles& walls) {
+  const GoalRegion place = fitting(goal, footprint.parts, size, walls).value_or(goal);
+  CollisionChecker checker(footprint, walls);
+  if (auto end = path_end(place, path, turns, 0.0, checker)) return end;
+  const EndTurns before{turns.on_spot, reverses, turns.radius, turns.spacing};
+  return path_end(place, path, turns, run_up(place, before, size, checker), checker);
 }
 
 }  // namespace pushplan

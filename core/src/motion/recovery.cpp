@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "pushplan/arithmetic.hpp"
 #include "pushplan/geometry/obstacles.hpp"
@@ -16,7 +15,6 @@ constexpr double kReach = 3.0;  // greatest distance of the place to turn [radii
 constexpr Index kMostPoses = 100'000;
 constexpr double kClearance = 1.05;  // that the robot needs to turn about [radii]
 constexpr double kDeeper = 1e-3;     // by how much it may get deeper into what it touches [radii]
-constexpr double kTurn = 2.0 * std::numbers::pi;
 
 /// Checks that the robot, itself and grown, gets no deeper into what it touches at the start.
 class DepthCheck {

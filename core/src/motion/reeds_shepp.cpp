@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 #include "pushplan/arithmetic.hpp"
@@ -10,7 +9,6 @@
 namespace pushplan {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kQuarter = 0.5 * std::numbers::pi;
 
 /// Miss at the goal up to which a word leads there [turning radii, rad].

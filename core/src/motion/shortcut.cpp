@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace pushplan {
 
@@ -36,7 +35,6 @@ Index lay_straight(const Pose& start, const Pose& end, double spacing, const Pat
 }
 
 Index copy_rest(const Path& path, Index last, const PathBuffer& out, Index size) {
-  constexpr double kTurn = 2.0 * std::numbers::pi;
   const Index rest = path.size() - 1 - last;
   // the new piece may end with whole turns more or less than the old one
   const double difference = out.poses[static_cast<std::size_t>(size - 1)].theta -

@@ -16,8 +16,6 @@ constexpr double kMostShift = 0.5;  // greatest change of an end's heading for t
 
 double sign(double x) { return x > 0.0 ? 1.0 : (x < 0.0 ? -1.0 : 0.0); }
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 /// A pose in the goal near `last` that a robot at `from` would drive straight into.
 Pose new_end(const Pose& from, const Pose& last, const ShortcutShift& shift,
              const PathProblem& problem) {
@@ -80,9 +78,10 @@ Piece pick_piece(Index count, const ShortcutDraw& draw) {
 
 }  // namespace
 
-ShortcutProposal propose_shortcut(const SweptPath& path, Index count, const ShortcutDraw& draw,
+ShortcutProposal propose_shortcut(const SweptPath& path, const ShortcutDraw& draw,
                                   const ShortcutShift& shift, const PathProblem& problem,
-                                  const SweptPath& trial) {
+                                  SweptPath& trial) {
+  const Index count = path.count;
   const bool to_end = draw.kind < kToEnd;
   auto [first, last] = pick_piece(count, draw);
   if (to_end) last = count - 1;
@@ -93,7 +92,7 @@ ShortcutProposal propose_shortcut(const SweptPath& path, Index count, const Shor
   if (to_place) {
     target = new_end(path.poses[at(first)], path.poses[at(count - 1)], shift, problem);
   }
-  const Path old{path.poses.first(at(count)), path.curvatures.first(at(count))};
+  const Path old{path.used(), std::span(path.curvatures).first(at(count))};
   const PathBuffer out = trial.buffer();
   Index size = copy_start(old, first, out);
   const auto drive_to = [&](const Pose& stop) {

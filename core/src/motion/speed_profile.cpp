@@ -2,14 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <vector>
 
 namespace pushplan {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kStraight = 1e-12;  // curvature that counts as none [1/m]
+constexpr double kStraight = 1e-12;  // curvature [1/m] or length [m] that counts as none
 constexpr double kRounding = 1e-3;   // way back that is no more than rounding [circumscribed radii]
 
 /// A part of a path that is driven with one speed, or turns on the spot.
@@ -77,6 +75,63 @@ void ease(std::span<Step> steps, const SpeedLimits& limits) {
   }
 }
 
+/// A step of a robot that slides.
+struct Slide {
+  double length;     // [m]
+  double turn;       // [rad]
+  double bearing;    // in the frame of the pose that it leads to [rad]
+  double curvature;  // turn over length [1/m]
+  double rate;       // speed [m/s]
+};
+
+/// Slows down where a step would change velocity or turn rate faster than the robot can, which has
+/// some speed before the first. Half of the acceleration changes the speed, half the rest.
+void ease(std::span<Slide> steps, const SpeedLimits& limits, double driven) {
+  const double acceleration = std::sqrt(0.5) * limits.max_acceleration;
+  const double turning = 0.5 * limits.max_turn_acceleration;
+  if ((std::isinf(acceleration) && std::isinf(turning)) || steps.empty()) return;
+  const auto gain = [&](const Slide& step) {
+    return std::min(acceleration, turning / std::max(std::abs(step.curvature), kStraight));
+  };
+  const auto limit = [](Slide& step, double rate) { step.rate = std::min(step.rate, rate); };
+  const auto faster = [](const Slide& step, double gained) {
+    return std::sqrt(step.rate * step.rate + gained);
+  };
+  std::vector<double> gains;
+  for (std::size_t i = 0; i + 1 < steps.size(); ++i) {
+    Slide& before = steps[i];
+    Slide& after = steps[i + 1];
+    const double between = 0.5 * (after.length + before.length);
+    const double swing = std::max(std::abs(wrap_angle(after.bearing - before.bearing)), kStraight);
+    const double change = std::max(std::abs(after.curvature - before.curvature), kStraight);
+    const double allowed = std::sqrt(std::min(acceleration / swing, turning / change) * between);
+    limit(before, allowed);
+    limit(after, allowed);
+    gains.push_back(2.0 * std::min(gain(after), gain(before)) * between);
+  }
+  limit(steps[0], std::sqrt(driven * driven + gain(steps[0]) * steps[0].length));
+  for (std::size_t i = 0; i < gains.size(); ++i) limit(steps[i + 1], faster(steps[i], gains[i]));
+  for (std::size_t i = gains.size(); i-- > 0;) limit(steps[i], faster(steps[i + 1], gains[i]));
+}
+
+std::vector<Slide> slides(std::span<const Pose> poses, const SpeedLimits& limits, Vec2 velocity) {
+  std::vector<Slide> steps;
+  double driven = 0.0;
+  for (std::size_t i = 0; i + 1 < poses.size(); ++i) {
+    const double dx = poses[i + 1].x - poses[i].x;
+    const double dy = poses[i + 1].y - poses[i].y;
+    const double turn = poses[i + 1].theta - poses[i].theta;
+    const double length = std::hypot(dx, dy);
+    const double within = std::max(length, kStraight);
+    double rate = limits.max_speed;
+    if (turn != 0.0) rate = std::min(rate, limits.turn_rate * length / std::abs(turn));
+    if (i == 0) driven = std::max((dx * velocity.x + dy * velocity.y) / within, 0.0);
+    steps.push_back({length, turn, std::atan2(dy, dx) - poses[i + 1].theta, turn / within, rate});
+  }
+  ease(steps, limits, driven);
+  return steps;
+}
+
 }  // namespace
 
 void fill_speed_profile(const Path& path, std::span<const double> chords, const SpeedLimits& limits,
@@ -116,6 +171,44 @@ void fill_speed_profile(const Path& path, std::span<const double> chords, const 
     profile.turn_rates[i] = step.on_spot ? step.rate : step.rate * step.curvature;
     time += step.extent / std::abs(step.rate);
   }
+}
+
+void fill_sliding_profile(std::span<const Pose> poses, const SpeedLimits& limits, Vec2 velocity,
+                          const SpeedProfile& profile) {
+  constexpr double kLeast = 1e-12;  // speed [m/s] or time [s]
+  std::vector<Slide> steps = slides(poses, limits, velocity);
+  double time = 0.0;
+  double jump = 0.0;  // greatest change of the turn rate [rad/s^2]
+  double last = 0.0;  // time that the step before takes [s]
+  // the last pose keeps the speed of the step that leads there
+  steps.push_back({0.0, 0.0, 0.0, 0.0, steps.empty() ? limits.max_speed : steps.back().rate});
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    const auto& [length, turn, bearing, curvature, rate] = steps[i];
+    const double takes = length > 0.0 ? length / std::max(rate, kLeast)
+                                      : std::abs(turn) / limits.turn_rate;
+    profile.times[i] = time;
+    profile.speeds[i] = rate;
+    profile.turn_rates[i] = turn / std::max(takes, kLeast);
+    if (i > 0 && i + 1 < steps.size()) {
+      const double change = std::abs(profile.turn_rates[i] - profile.turn_rates[i - 1]);
+      jump = std::max(jump, 2.0 * change / std::max(takes + last, kLeast));
+    }
+    time += takes;
+    last = takes;
+  }
+  const double slower = std::sqrt(std::max(1.0, jump / limits.max_turn_acceleration));
+  for (double& value : profile.times) value *= slower;
+  for (double& value : profile.speeds) value /= slower;
+  for (double& value : profile.turn_rates) value /= slower;
+}
+
+double turn_acceleration(std::span<const double> turn_rates, std::span<const double> times) {
+  double greatest = 0.0;
+  for (std::size_t i = 0; i + 2 < times.size(); ++i) {
+    const double takes = std::max(0.5 * (times[i + 2] - times[i]), 1e-300);
+    greatest = std::max(greatest, std::abs(turn_rates[i + 1] - turn_rates[i]) / takes);
+  }
+  return greatest;
 }
 
 }  // namespace pushplan

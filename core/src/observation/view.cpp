@@ -5,8 +5,6 @@
 namespace pushplan {
 namespace {
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 /// The nearest of `count` cells; truncation rounds down what is not negative.
 Index cell_at(double place, Index count) {
   return static_cast<Index>(std::min(std::max(0.0, place), static_cast<double>(count - 1)));

@@ -14,7 +14,6 @@ namespace {
 constexpr int kBisections = 24;
 constexpr double kShortestEdge = 0.08;  // edge that is left out, in roots of the target area
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 std::size_t next(std::size_t i, std::size_t count) { return i + 1 < count ? i + 1 : 0; }
 
 /// A convex polygon in a buffer, which is cut and thinned out in place.

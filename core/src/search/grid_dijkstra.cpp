@@ -1,17 +1,10 @@
 #include "pushplan/search/grid_dijkstra.hpp"
 
 #include <cmath>
-#include <limits>
+
+#include "pushplan/arithmetic.hpp"
 
 namespace pushplan {
-namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
-}  // namespace
-
 GridDijkstra::GridDijkstra(ArrayView<const double, 2> weights, double cell,
                            std::span<const Index> starts)
     : weights_(weights),

@@ -1,6 +1,5 @@
-"""Model-predictive tracking of a path."""
+"""Predictive tracking of a path."""
 
-from pushplan.control.mpc.mpc_config import MpcConfig
-from pushplan.control.mpc.tracker import MpcTracker
+from pushplan.control.mpc.tracker import MpcConfig, MpcTracker
 
 __all__ = ["MpcConfig", "MpcTracker"]

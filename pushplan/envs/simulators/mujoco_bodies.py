@@ -10,8 +10,7 @@ import numpy as np
 
 from pushplan.envs.simulators.base import Materials
 from pushplan.envs.simulators.mujoco_library import mujoco
-from pushplan.envs.simulators.mujoco_model import scene_model
-from pushplan.envs.simulators.mujoco_options import MujocoOptions
+from pushplan.envs.simulators.mujoco_model import MujocoOptions, scene_model
 from pushplan.envs.simulators.mujoco_sleep import (
     AWAKE,
     put_to_sleep,

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,21 +15,64 @@ from pushplan.envs.simulators.base import (
     Materials,
     Simulator,
     SimulatorState,
+    Trace,
     checked_path,
     straight_leg,
 )
-from pushplan.envs.simulators.momentum import Momentum
 from pushplan.envs.simulators.pymunk_bodies import PymunkBodies
-from pushplan.envs.simulators.pymunk_options import PymunkOptions
-from pushplan.envs.trace import Trace
-from pushplan.geometry.obstacles import obstacles_of
+from pushplan.geometry import gyration_squares
+from pushplan.geometry.obstacles import grown_map
 from pushplan.interaction.interaction_model import Interaction
-from pushplan.world import Twist, World
+from pushplan.world import InvalidInputError, Twist, World
+from pushplan.world.checked_fields import CheckedFields, Limits, PositiveInt
 from pushplan.world.checks import FloatArray, frozen, number
 
+_Small = Annotated[float, Limits(0.0, 0.2, open_low=True)]
 _LEAST_SIZE = 0.01
 """Objects far smaller than this fraction of the robot or of the others do not refine the steps."""
 _REST = 2e-4  # objects that move slower than this fraction of their size per second stop
+
+
+@dataclass(frozen=True)
+class PymunkOptions(CheckedFields):
+    """Numerical settings. Lengths are fractions of the objects' median radius.
+
+    Where sizes differ much, four times the least radius counts instead, if that is smaller.
+
+    Args:
+        travel: how far the fastest point of the robot may move in one substep. At the default
+            (2.8 mm for a 1 m box) boxes end where substeps ten times finer put them to 0.2 % of
+            their size (median) and total work agrees to 0.1 %: docs/simulators.md has the table.
+        slop: overlap that the contact solver leaves alone. It has to be small against an object,
+            because an object rides that far inside its pusher, and not much smaller than
+            ``travel``, because an object that is pushed out of contact in each substep is hit
+            again in the next and chatters.
+        tolerance: overlap at which the robot is held, when something static is involved.
+        decay: fraction of its speed that a rolling or floating object may lose in one substep.
+        iterations: sweeps of the contact solver in each substep.
+        samples: poses recorded in each call of `PymunkSimulator.step`, at even intervals.
+        holds_direction: the robot keeps the direction in the world that it had when a
+            command began, and turns beside that, as in the code of the 2D benchmark; else its
+            velocity turns with it, on an arc.
+    """
+
+    field_prefix = "pymunk "
+
+    travel: _Small = 0.008
+    slop: _Small = 0.002
+    tolerance: _Small = 0.012
+    decay: _Small = 0.04
+    iterations: PositiveInt = 10
+    samples: PositiveInt = 8
+    holds_direction: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.tolerance < self.travel + self.slop:
+            raise InvalidInputError(
+                f"pymunk tolerance must be at least travel + slop = "
+                f"{self.travel + self.slop:g}, got {self.tolerance:g}"
+            )
 
 
 class PymunkSimulator(Simulator):
@@ -79,7 +123,7 @@ class PymunkSimulator(Simulator):
             reach=core.Reach(
                 robot.vertices, robot.offsets, movables.vertices, movables.offsets, movables.radii
             ),
-            obstacles=obstacles_of(world.static),
+            obstacles=grown_map(world.static).obstacles,
             keeps=momentum.keeps,
             inertia=momentum.inertia,
             drag=momentum.drag,
@@ -163,3 +207,35 @@ class PymunkSimulator(Simulator):
     def remove(self, object_ids: Sequence[int]) -> None:
         """Take objects off the floor."""
         self.build(self._without(object_ids)[0], self._materials)
+
+
+@dataclass(frozen=True)
+class Momentum:
+    """Drag on rolling and floating bodies; plain objects on the ground keep nothing.
+
+    A body's law is ``m v' = -(b + c |v|) v``, and likewise about the vertical axis. A wheeled
+    object has ``b = m / rolling_time`` and no c.
+    """
+
+    # (N,) whether the body keeps anything; the first is the robot, which never does
+    keeps: FloatArray
+    inertia: FloatArray  # (N, 2) mass [kg] and moment of inertia [kg m²]
+    drag: FloatArray  # (N, 4) b and c of the translation and of the rotation, over mass and moment
+
+    @classmethod
+    def of(cls, world: World, materials: Materials) -> Momentum:
+        """For the robot and all objects of a world."""
+        movables = world.movables
+        moments = movables.masses * gyration_squares(movables)
+        inertia = np.ones((1 + len(movables), 2))
+        inertia[1:, 0] = movables.masses
+        inertia[1:, 1] = moments
+        drag = np.zeros((len(inertia), 4))
+        if materials.water is not None:
+            drag = materials.water.coefficients(world) / np.repeat(inertia, 2, axis=1)
+            keeps = np.ones(len(inertia), dtype=bool)
+        else:
+            drag[:, [0, 2]] = 1.0 / materials.rolling_time
+            keeps = np.concatenate([[False], movables.wheeled])
+        keeps[0] = False
+        return cls(keeps.astype(np.float64), inertia, drag)

@@ -9,8 +9,7 @@ from pkgutil import resolve_name
 from types import SimpleNamespace
 from typing import Any
 
-from pushplan.envs.simulators.base import Materials, Solids
-from pushplan.envs.simulators.water import Water
+from pushplan.envs.simulators.base import Materials, Solids, Water
 from pushplan.files.safe_files import read_data
 from pushplan.world import Drive, RobotModel
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,24 +15,20 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
 from pushplan.drawing.figure import COLUMN, STYLE, TEXT, save_figure
-from pushplan.evaluation.report.plot_style import (
-    LINE,
-    add_legend,
-    dots,
-    interval,
-    line,
-    tidy,
-    unclipped,
-    wrapped,
-)
+from pushplan.drawing.palette import DASHES, MARKERS, SERIES
 from pushplan.evaluation.report.tables import heading
 from pushplan.evaluation.statistics.aggregates import performance_profile
-from pushplan.evaluation.statistics.estimates import estimate
+from pushplan.evaluation.statistics.estimates import Estimate, Proportion, estimate
 from pushplan.evaluation.statistics.stored_run import StoredRun
 from pushplan.evaluation.statistics.summary import PolicySummary, grouped, values_of
 from pushplan.evaluation.store.rows import ResultRow
 from pushplan.metrics import Role, metric_names
 
+NAME_LETTERS = 16
+"""Letters of a policy's name on a line, so that figures of one column have room beside them."""
+
+LINE = 0.15
+"""Height of a line of text [inch]."""
 PANEL = (COLUMN, 2.9)
 """Width and height of one panel [inch]: a column of a paper, with letters of 8 points."""
 TITLE_LETTERS = 18
@@ -371,3 +368,59 @@ FIGURES = {
     "planning_time": ("Time of a planning call", _planning_time),
 }
 """Name -> caption, and what draws it."""
+
+
+def dots(index: int) -> dict[str, Any]:
+    """Colour and marker of a policy; they repeat together after 64 policies."""
+    return _style(index, "marker", MARKERS)
+
+
+def line(index: int) -> dict[str, Any]:
+    """Colour and dashes of a policy."""
+    return _style(index, "linestyle", DASHES)
+
+
+def _style(index: int, name: str, kinds: Sequence[Any]) -> dict[str, Any]:
+    turn, colour = divmod(index, len(SERIES))
+    return {"color": SERIES[colour], name: kinds[(index + turn) % len(kinds)]}
+
+
+def interval(one: Estimate | Proportion) -> list[list[float]]:
+    """An interval as Matplotlib's error bars take it; NaN, which draws none, if there is none."""
+    middle = one.mean if isinstance(one, Estimate) else one.fraction
+    # in this order NaN stays NaN
+    return [[max(middle - one.low, 0.0)], [max(one.high - middle, 0.0)]]
+
+
+def wrapped(text: str, letters: int = NAME_LETTERS) -> str:
+    """A name on lines of so many letters, broken behind spaces and signs; no formula of TeX."""
+    pieces = re.findall(rf".{{0,{letters - 1}}}[\s@_/,-]|.{{1,{letters}}}", f"{text} ")
+    return "\n".join(piece.strip() for piece in pieces).replace("$", r"\$")
+
+
+def add_legend(figure: Figure) -> None:
+    """Name the lines of all axes once, below them; the figure grows by what that takes."""
+    found = dict[str, Any]()
+    for axes in figure.axes:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            found.setdefault(label, handle)
+    names = [wrapped(label) for label in found]
+    longest = max((len(line) for name in names for line in name.splitlines()), default=0)
+    columns = min(len(names), max(1, int(COLUMN / (0.6 + 0.065 * longest))))
+    lines = sum(name.count("\n") + 1 for name in names)
+    figure.set_figheight(figure.get_figheight() + LINE * (lines / max(columns, 1) + 1.0))
+    figure.legend(found.values(), names, loc="outside lower center", ncols=columns, frameon=False)
+
+
+def unclipped(*artists: Any) -> None:
+    """Let markers at the limit of a score be whole."""
+    for artist in artists:
+        artist.set_clip_on(False)
+
+
+def tidy(axes: Any) -> None:
+    """A faint grid behind everything, and no frame at the top and on the right."""
+    axes.grid(alpha=0.25, linewidth=0.6)
+    axes.set_axisbelow(True)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)

@@ -28,7 +28,7 @@ _GIT_S = 5.0
 UNSEEN = frozenset(
     {
         *("cli", "ros", "training", "evaluation/report", "evaluation/statistics"),
-        *("evaluation/store/merging", "evaluation/store/rescoring", "evaluation/store/salvaging"),
+        *("evaluation/store/merging", "evaluation/store/rescoring"),
         *("evaluation/store/status", "evaluation/run/reproduction"),
     }
 )

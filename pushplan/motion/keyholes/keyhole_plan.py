@@ -8,8 +8,7 @@ import numpy as np
 
 from pushplan.interaction import InteractionModel
 from pushplan.motion.keyholes.keyhole_search import KeyholeEnd
-from pushplan.motion.speed_profile import timed_plan
-from pushplan.motion.swept_path import SweptPath
+from pushplan.motion.speed_profile import SweptPath, timed_plan
 from pushplan.world import GoalPose, Plan, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import arc_lengths, step_lengths

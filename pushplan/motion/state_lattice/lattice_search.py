@@ -10,12 +10,12 @@ from pushplan.core import motion as core
 from pushplan.core import search
 from pushplan.geometry.angles import wrap_angle
 from pushplan.motion.collision import goal_numbers
+from pushplan.motion.speed_profile import SweptPath
 from pushplan.motion.state_lattice.built_lattice import BuiltLattice
 from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
 from pushplan.motion.state_lattice.lattice_config import SPACING, LatticeConfig
 from pushplan.motion.state_lattice.primitives import connections
 from pushplan.motion.state_lattice.swaths import flat_runs
-from pushplan.motion.swept_path import SweptPath
 from pushplan.motion.time_slicing import go_on
 from pushplan.world import GoalLine, World
 from pushplan.world.checks import FloatArray, IntArray
@@ -161,5 +161,4 @@ def _cut_at_line(
 
 def bare_path(poses: FloatArray, curvatures: FloatArray) -> SweptPath:
     """A path about which nothing is predicted."""
-    works = np.zeros(len(poses))
-    return SweptPath(poses, curvatures, None, arc_lengths(poses), works)  # type: ignore[arg-type]
+    return SweptPath(poses, curvatures, None, arc_lengths(poses), np.zeros(len(poses)))

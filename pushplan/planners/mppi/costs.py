@@ -9,8 +9,14 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from pushplan.errors import short
-from pushplan.planners.mppi.approach_grid import Approach
-from pushplan.planners.mppi.fields import CLEARANCE, Field, object_field, robot_field, sample
+from pushplan.planners.mppi.approach_grid import (
+    CLEARANCE,
+    Approach,
+    Field,
+    object_field,
+    robot_field,
+    sample,
+)
 from pushplan.planners.mppi.mppi_config import MppiConfig
 from pushplan.planners.mppi.rollout_model import BLOCKED, Rollouts
 from pushplan.world import InvalidInputError, World

@@ -7,11 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pushplan.interaction import InteractionModel, QuasiStatic
-from pushplan.motion.path_improver import PathImprover
-from pushplan.motion.speed_profile import turning_radius
-from pushplan.planners.push_aware.planning_call import PushAwareSearch
+from pushplan.motion.path_planner import plan_path
 from pushplan.planners.push_aware.push_aware_config import PushAwareConfig
-from pushplan.world import PlanResult, RobotModel, Stop, World
+from pushplan.world import PlanResult, Stop, World
 from pushplan.world.checks import expect
 from pushplan.world.planning_call import PlanningCall
 from pushplan.world.stop import DefaultBudget
@@ -36,10 +34,8 @@ class PushAware:
     The first plan follows the shortest path around the walls in Dubins curves, or is that of a
     kinodynamic random tree. Then best-first searches over (x, y, heading), whose nodes hold where
     the objects are by then, take turns with random trees, each under the cost of the best plan so
-    far, and what they find is shortcut at random with Dubins curves. A fraction of the iterations
-    goes into a random tree over poses and costs (AO-RRT; Hauser and Zhou, arXiv 1505.04098), which
-    makes the whole asymptotically optimal wherever that is. The cheapest path is returned when the
-    stop rule fires; waiting longer never costs more.
+    far, and what they find is shortcut at random with Dubins curves. The cheapest path is returned
+    when the stop rule fires; waiting longer never costs more.
 
     Use it where a tenth of a second is worth a better path, and the world is two-dimensional with
     convex objects. ``stats.detail`` holds ``cost``, ``bound``, which no plan can undercut, and
@@ -70,32 +66,4 @@ class PushAware:
             InvalidInputError: if the world's goal is not one for the robot.
         """
         call = PlanningCall(world, stop, rng, DefaultBudget(self.config.default_iterations))
-        radius = _least_radius(world.robot, self.config)
-        improver = PathImprover(call, self.config, self.interaction, radius)
-        search = PushAwareSearch(improver, self.config)
-        status = search.run() or call.stopped_status
-        detail = {
-            "trees": float(search.trees.trees),
-            "searches": float(search.searches),
-            "expansions": float(search.expansions),
-            "random_arcs": float(search.random_arcs),
-        }
-        if status.has_plan:
-            detail["cost"] = float(improver.best_cost)
-            detail["bound"] = search.bound
-            detail["gap"] = _gap(float(improver.best_cost), search.bound)
-        return improver.result(status, **detail)
-
-
-def _least_radius(robot: RobotModel, config: PushAwareConfig) -> float:
-    """Least turning radius of plans [m], as long as there is a way with it."""
-    if robot.turns_on_spot:
-        return config.differential_radius * robot.circumscribed_radius
-    return turning_radius(robot, config.turn_fraction)
-
-
-def _gap(cost: float, bound: float) -> float:
-    """By what fraction a cost exceeds a bound; infinite where the bound says nothing."""
-    if cost <= bound:
-        return 0.0
-    return cost / bound - 1.0 if bound > 0.0 else float("inf")
+        return plan_path(call, self.config, self.interaction, "push_aware")

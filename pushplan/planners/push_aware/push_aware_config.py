@@ -30,8 +30,6 @@ class PushAwareConfig(PathSearchConfig):
             much: the table is up to a tenth too long.
         differential_radius: least turning radius of a differential drive [R]; less where there is
             no way with it.
-        random_fraction: fraction of the iterations that go into a random tree over poses and costs,
-            which finds, in the end, what the search cannot represent.
     """
 
     push_weight: NonNegativeFloat = 2.5
@@ -41,4 +39,3 @@ class PushAwareConfig(PathSearchConfig):
     differential_radius: Annotated[float, Limits(TIGHTEST)] = 1.0
     heuristic_inflation: NonNegativeFloat = 1.05
     pruning_factor: NonNegativeFloat = 0.92
-    random_fraction: NonNegativeFloat = 0.03

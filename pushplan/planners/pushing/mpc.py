@@ -13,7 +13,7 @@ from pushplan.control.mpc.tracker import limits_of, track_of
 from pushplan.core import control
 from pushplan.core import pushing as core
 from pushplan.geometry import gyration_squares
-from pushplan.geometry.obstacles import obstacles_of
+from pushplan.geometry.obstacles import grown_map
 from pushplan.planners.pushing.bumper import faces_of
 from pushplan.planners.pushing.parameters import PushingConfig
 from pushplan.planners.pushing.push_model import PushModel, PushState
@@ -111,7 +111,7 @@ class PushingMpc:
             self._begin(world, plan, k)
         command = tracker.follow(
             self._track,
-            obstacles_of(world.static),
+            grown_map(world.static).obstacles,
             world.robot_pose,
             world.movables.poses[k],
             world.time,

@@ -12,9 +12,8 @@ import numpy as np
 from pushplan.control import Legs
 from pushplan.control.leg_follower import turn_to
 from pushplan.core import rearrangement as core
-from pushplan.planners.rearrangement.approach_lattice import ContactGrid
 from pushplan.planners.rearrangement.push import Push
-from pushplan.planners.rearrangement.push_scene import PushScene
+from pushplan.planners.rearrangement.push_scene import ContactGrid, PushScene
 from pushplan.world.checks import FloatArray, IntArray
 
 _NO_POSES = np.zeros(0, dtype=np.int64)

@@ -18,7 +18,7 @@ from pushplan.planners.rearrangement.push_choice import (
     choose_push,
     scene_after,
 )
-from pushplan.planners.rearrangement.push_execution import ExecutionEnd, PushExecution
+from pushplan.planners.rearrangement.push_controllers import ExecutionEnd, PushExecution
 from pushplan.planners.rearrangement.push_graph import PushGraph
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import combinations
 from typing import TYPE_CHECKING
@@ -35,7 +35,9 @@ from pushplan.planners.rearrangement.candidates import (
 )
 from pushplan.planners.rearrangement.push import Push
 from pushplan.planners.rearrangement.push_scene import PushScene
-from pushplan.planners.rearrangement.relocation import relocating_pushes
+from pushplan.planners.rearrangement.push_simulator import simulate_primitive
+from pushplan.planners.rearrangement.relocation_search import RelocationSearch
+from pushplan.planners.rearrangement.rollout_cache import Asked
 from pushplan.world.checks import FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -50,6 +52,8 @@ _SAME_END_TURN = 0.8
 """Sides of the boxes of ends of pushes that share their approaches [cells, rad]."""
 _LONGER = 1.5  # length of an approach that is not searched [straight line]
 _UNREACHABLE = 5.0  # cost of getting to what cannot be got to later [diagonals of the map]
+_NEARBY = 8.0
+"""Distance from the object beyond which nothing counts for the search [circumscribed radii]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -323,3 +327,55 @@ def _between(scene: PushScene, pushes: Sequence[Push]) -> FloatArray:
         out[late] = longer * straight[late]
     np.fill_diagonal(out, np.inf)
     return out
+
+
+def relocating_pushes(
+    scene: PushScene, k: int, approach: ApproachTree, thorough: bool = False
+) -> list[Push]:
+    """Drives after which object ``k`` can be pushed home, or else lies better than now.
+
+    Behind an object in a gap, in a corner or flat at a wall there is no clearance for the robot.
+    But it may be nudged along the wall, or hooked out backwards or turned by the end of the bumper.
+    What the search found counts again while nothing has moved.
+
+    Args:
+        scene: the scene.
+        k: index of the object.
+        approach: from where the robot is.
+        thorough: look for drives that cost much more than the best one too.
+    """
+    movables = scene.movables
+    cache = scene.cache
+    found = None
+    near = np.hypot(*(scene.poses[:, :2] - scene.poses[k, :2]).T) < _NEARBY * scene.size
+    asked = Asked(
+        movables.ids[near].tobytes() + scene.poses[near].tobytes(), scene.robot_cell, thorough
+    )
+    if cache is not None:
+        found = cache.relocations(int(movables.ids[k]), asked)
+        if found is None and cache.searches >= scene.config.max_searches:
+            return []
+    if found is None:
+        if not scene.push_cost_to_go(k).prepare(scene.budget):
+            return []
+        search = scene.known(
+            ("relocations", k, thorough), lambda: RelocationSearch(scene, k, approach, thorough)
+        )
+        found = search.run()
+        if search.interrupted and scene.budget.stopped:  # the next decision goes on with it
+            return []
+        if cache is not None and not search.interrupted:
+            cache.keep_relocations(int(movables.ids[k]), asked, found)
+    key = "relocating", k, thorough
+    known, pushes = scene.progress.get(key, (None, []))
+    if known is found:
+        return list(pushes)
+    pushes = []
+    for path, extra, moved in found:
+        poses = scene.poses.copy()
+        for number, pose in moved.items():
+            poses[movables.ids == number] = pose
+        for push in simulate_primitive(scene, path, k, poses):
+            pushes.append(replace(push, cost=push.cost + extra))
+    scene.progress[key] = found, pushes
+    return list(pushes)

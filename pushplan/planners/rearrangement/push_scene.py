@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pushplan.core import interaction
 from pushplan.core import rearrangement as core
@@ -17,7 +19,6 @@ from pushplan.interaction.quasi_static import Settings
 from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.keep_out import keep_out
 from pushplan.planners.arguments import check_pusher
-from pushplan.planners.rearrangement.approach_lattice import ContactGrid, contact_grid
 from pushplan.planners.rearrangement.object_paths import (
     ObjectPaths,
     PushCostToGo,
@@ -29,7 +30,7 @@ from pushplan.planners.rearrangement.push_starts import PushStarts
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.planners.rearrangement.search_budget import SearchBudget
-from pushplan.world import Movables, PushplanError, World
+from pushplan.world import Movables, PushplanError, RobotModel, StaticMap, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 T = TypeVar("T")
@@ -66,6 +67,8 @@ _POSE_S = 6e-7
 """Time that a pose of the lattice takes [s]."""
 _TURN_COST = 0.03
 """Cost of a turn by one radian on the spot, so that needless ones are left out."""
+_LEAST_CELL = 0.012
+"""Side of a cell that is not too small for the map, as a fraction of its longer side."""
 
 
 def pose_distance(pose: FloatArray, other: FloatArray, size: float) -> float:
@@ -351,3 +354,64 @@ class PushScene:
             slack=_SLACK * self.size,
             margin=_LEAST_MARGIN * self.size,
         )
+
+
+class ContactGrid(NamedTuple):
+    """A lattice with the objects on it."""
+
+    grid: core.PoseGrid
+    layers: NDArray[np.float32]  # (K, 16, rows, columns) depth of the footprint in each object [m]
+
+
+def contact_grid(
+    robot: RobotModel,
+    static: StaticMap,
+    cell: float,
+    margin: float,
+    poses: FloatArray,
+    bodies: interaction.Bodies,
+    part: float = 1.0,
+) -> ContactGrid:
+    """The lattice for a robot among what is static and objects.
+
+    Args:
+        robot: its footprint.
+        static: walls and columns.
+        cell: side of a cell that is not too small for the map [circumscribed radii].
+        margin: distance to keep from what is static [circumscribed radii].
+        poses: (K, 3) of the objects.
+        bodies: their shapes.
+        part: of such a cell, for a finer lattice.
+    """
+    size = robot.circumscribed_radius
+    away = margin * size
+    sides = static.bounds[2:] - static.bounds[:2]
+    side = max(cell, _LEAST_CELL * float(sides.max()) / size) * size
+    grid = make_pose_grid(robot, static, part * side, away)
+    return ContactGrid(grid, grid.contact_depths(footprint(robot, away), poses, bodies))
+
+
+@functools.lru_cache(maxsize=8)
+def make_pose_grid(
+    robot: RobotModel, static: StaticMap, step: float, margin: float
+) -> core.PoseGrid:
+    """The lattice for a robot among what is static; kept for the maps used last.
+
+    Args:
+        robot: its footprint.
+        static: walls and columns.
+        step: side of a cell [m].
+        margin: distance to keep from what is static [m].
+    """
+    x0, y0, x1, y1 = static.bounds.tolist()
+    cols = int((x1 - x0) / step) + 1
+    rows = int((y1 - y0) / step) + 1
+    return core.PoseGrid(
+        x0 + 0.5 * ((x1 - x0) - (cols - 1) * step),
+        y0 + 0.5 * ((y1 - y0) - (rows - 1) * step),
+        step,
+        rows,
+        cols,
+        footprint(robot, margin),
+        obstacles(static),
+    )

@@ -25,10 +25,10 @@ from pushplan.planners.rearrangement.approach import (
     find_route,
     simulate_route,
 )
-from pushplan.planners.rearrangement.candidates import GAIN
+from pushplan.planners.rearrangement.candidates import GAIN, attempts
 from pushplan.planners.rearrangement.push_scene import PushScene, pose_distance
+from pushplan.planners.rearrangement.push_simulator import PushAttempt, end_of, simulate
 from pushplan.planners.rearrangement.push_starts import initial_heading
-from pushplan.planners.rearrangement.pushability import MARGINS, can_be_pushed, failing_margins
 from pushplan.planners.rearrangement.rollout_cache import Primitive, RolloutCache
 from pushplan.world.checks import FloatArray
 
@@ -54,6 +54,13 @@ _HORIZON = 3.0
 """Length of a push that shows that the object can be delivered."""
 _LEAST_MOVE = 0.15  # by so much an object has to be moved for it to count
 _SPACING = 0.05  # distance that an object moves on until it is looked at anew
+_ADVANCE = 0.6
+"""Least progress of an object that can be pushed at all, as a fraction of the robot's path."""
+_ERRORS = np.array([[0.08, 0.08, 0.15], [-0.08, 0.08, -0.15], [0.0, -0.1, 0.0]])
+"""Errors of the prediction that a push home afterwards has to tolerate: x, y [circumscribed
+radii], and heading [rad]."""
+MARGINS = (1.0, 2.0, 3.0)
+"""Factors on them; a relocation costs a radius more for each that it does not tolerate."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -336,3 +343,63 @@ class RelocationSearch:
                     pose = scene.starts.behind(k, heading, shift * scene.half)
                     if scene.starts.fits(pose) and scene.starts.is_clear(pose):
                         yield pose
+
+
+def can_be_pushed(scene: PushScene, k: int, horizon: float) -> bool:
+    """Return True if some push delivers object ``k``, or advances it where the goal is far away.
+
+    Args:
+        scene: the scene.
+        k: index of the object.
+        horizon: how far the robot drives at most to see that [m].
+    """
+    target = int(scene.movables.ids[k])
+    costs = scene.push_cost_to_go(k)
+    now = costs.at(scene.poses[k])
+
+    def gets_on(attempt: PushAttempt) -> bool:
+        if now <= horizon:
+            return any(target in push.delivers for push in simulate(scene, attempt))
+        end = end_of(scene, replace(attempt, limit=min(attempt.limit, horizon)))
+        return bool(end[0] >= 0.5 * core.REMOVED or costs.at(end) <= now - _ADVANCE * horizon)
+
+    return any(
+        not scene.budget.is_over
+        and all(gets_on(replace(attempt, friction=one)) for one in (None, *row.frictions))
+        for row in scene.config.primitives
+        if row.controller != "arc" and not row.deep and not row.partners
+        for attempt in attempts(scene, k, row)
+    )
+
+
+def failing_margins(
+    scene: PushScene,
+    k: int,
+    poses: FloatArray,
+    horizon: float,
+    cache: RolloutCache | None = None,
+) -> int:
+    """Count the margins that a push of an object home does not tolerate.
+
+    Args:
+        scene: the scene.
+        k: index of the object.
+        poses: (K, 3) where the objects are to be pushed from.
+        horizon: see `can_be_pushed`.
+        cache: rollouts of a count that was interrupted.
+    """
+    units = np.array([scene.size, scene.size, 1.0])
+
+    def delivers(error: FloatArray) -> bool:
+        displaced = np.array(poses)
+        if displaced[k, 0] < 0.5 * core.REMOVED:
+            displaced[k] += error * units
+        after = scene.with_objects_at(displaced, cache)
+        return bool(after.done[k]) or can_be_pushed(after, k, horizon)
+
+    if not delivers(np.zeros(3)):
+        return len(MARGINS)
+    for n, margin in enumerate(MARGINS):
+        if not all(delivers(margin * error) for error in _ERRORS):
+            return len(MARGINS) - n
+    return 0

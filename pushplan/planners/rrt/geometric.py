@@ -11,14 +11,14 @@ from pushplan.core import motion as core
 from pushplan.motion.collision import obstacles
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.polyline_plan import polyline_result
-from pushplan.motion.random_tree.ompl_calls import (
+from pushplan.motion.speed_profile import goal_is_outside, start_margin
+from pushplan.planners.rrt.ompl_calls import (
     GoalRegion,
     grow_to,
     ompl_alone,
     own_state,
     plane_bounds,
 )
-from pushplan.motion.speed_profile import goal_is_outside, start_margin
 from pushplan.world import MaxIterations, NavigationGoal, PlanResult, PlanStatus, Stop, World
 from pushplan.world.checked_fields import CheckedFields, PositiveFloat, PositiveInt
 from pushplan.world.checks import FloatArray, expect

@@ -23,9 +23,8 @@ from pushplan.motion.state_lattice.lattice_search import (
     sample_arcs,
 )
 from pushplan.motion.time_slicing import Stopped, go_on
-from pushplan.planners.ship_predictive.beam_search import SPACING
+from pushplan.planners.ship_predictive.beam_search import SPACING, MapPropagator
 from pushplan.planners.ship_predictive.channel_view import ChannelView, channel_view
-from pushplan.planners.ship_predictive.map_propagator import MapPropagator
 from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
 from pushplan.world import Plan, PlanResult, PlanStatus, Stop, World
 from pushplan.world.checks import FloatArray, expect, number

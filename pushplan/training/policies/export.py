@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pushplan.imports.on_demand import need
 from pushplan.learned import OnnxPolicy, Specification
-from pushplan.learned.onnx_session import NOISE
+from pushplan.learned.onnx_policy import NOISE
 from pushplan.learned.specification import METADATA_KEY
 from pushplan.training.libraries import write_onnx
 from pushplan.training.policies.environment import TrainingEnv

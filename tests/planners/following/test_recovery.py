@@ -24,8 +24,7 @@ from pushplan.envs import make
 from pushplan.interaction import QuasiStatic
 from pushplan.motion.collision import footprint, obstacles
 from pushplan.planners import make_planner, policy_for
-from pushplan.planners.following.plan_follower import PlanFollower
-from pushplan.planners.following.recovery_timing import RecoveryRule
+from pushplan.planners.following.plan_follower import PlanFollower, RecoveryRule
 from pushplan.scenarios import Scenario
 from pushplan.world import (
     MaxIterations,

@@ -13,9 +13,8 @@ from pushplan.interaction import InteractionModel, QuasiStatic
 from pushplan.interaction.ice_interaction import IceInteraction
 from pushplan.planners import make_policy
 from pushplan.planners.mppi import Mppi, MppiConfig
-from pushplan.planners.mppi.control_sequence import ControlSequence, draw, interpolation
-from pushplan.planners.mppi.rollout_model import RolloutModel
-from pushplan.planners.mppi.update_rules import elite_weights, exponential_weights, updated
+from pushplan.planners.mppi.mppi import elite_weights, exponential_weights, updated
+from pushplan.planners.mppi.rollout_model import ControlSequence, RolloutModel, draw, interpolation
 from pushplan.world import (
     ClearanceArea,
     Drive,

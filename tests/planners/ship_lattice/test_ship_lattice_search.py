@@ -21,7 +21,7 @@ from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
 from pushplan.motion.state_lattice.lattice_map import HullWindow, place_costs
 from pushplan.motion.state_lattice.lattice_search import open_search
 from pushplan.planners.ship_lattice import ShipLattice, ShipLatticeConfig
-from pushplan.planners.ship_lattice.ship_lattice_call import floe_costs
+from pushplan.planners.ship_lattice.ship_lattice import floe_costs
 from pushplan.world import GoalLine, World
 
 EXACT = {"heuristic": "bound", "inflation": 1.0}

@@ -26,8 +26,6 @@ class ObstacleGrid {
   double cell() const { return cell_; }    // side of a cell [m]
   Index rows() const { return rows_; }
   Index columns() const { return columns_; }
-  std::span<const Index> first() const { return first_; }
-  std::span<const Index> items() const { return items_; }
 
   /// The numbers of the obstacles in a cell.
   std::span<const Index> in_cell(Index row, Index column) const {

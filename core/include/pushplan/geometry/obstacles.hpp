@@ -20,6 +20,19 @@ struct Obstacles {
   Index count() const { return static_cast<Index>(radii.size()); }
 };
 
+/// S convex polygons in the world frame, in groups of neighbours.
+struct ConvexObstacles {
+  static constexpr Index kGroup = 16;  // polygons whose boxes are looked at together
+
+  Polygons polygons;            // [m]
+  std::span<const Box> boxes;   // (S,) around each
+  std::span<const Box> groups;  // (ceil(S / kGroup),) around each group
+  Box bounds;                   // the workspace; a pose outside is not free
+
+  Index count() const { return static_cast<Index>(boxes.size()); }
+  Index group_count() const { return static_cast<Index>(groups.size()); }
+};
+
 /// Signed distance [m] of a point to a core, negative inside.
 double core_distance(Vec2 p, Polygon core);
 
@@ -31,10 +44,5 @@ bool crosses_obstacle(Vec2 p, Vec2 q, const Obstacles& obstacles, Index k, doubl
 
 /// True if the segment p-q stays at least `margin` [m] away from all obstacles.
 bool line_of_sight(Vec2 p, Vec2 q, const Obstacles& obstacles, double margin);
-
-/// Marks the points that lie in the box and `gap` or more off every obstacle. `keep` has as many
-/// elements as there are points.
-void free_points(std::span<const Vec2> points, const Obstacles& obstacles, const Box& box,
-                 double gap, std::span<bool> keep);
 
 }  // namespace pushplan

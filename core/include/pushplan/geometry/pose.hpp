@@ -62,7 +62,7 @@ inline std::size_t next_corner(Polygon polygon, std::size_t i) {
 
 /// The box around a polygon.
 inline Box box_around(Polygon polygon) {
-  Box box{polygon[0].x, polygon[0].y, polygon[0].x, polygon[0].y};
+  Box box{kInfinity, kInfinity, -kInfinity, -kInfinity};
   for (const Vec2 p : polygon) {
     box = {std::min(box.x_min, p.x), std::min(box.y_min, p.y), std::max(box.x_max, p.x),
            std::max(box.y_max, p.y)};
@@ -100,10 +100,7 @@ struct Compounds {
 };
 
 /// The equivalent angle in [-pi, pi]; half a turn keeps the sign that rounding to even gives it.
-inline double wrap_angle(double angle) {
-  constexpr double kTurn = 2.0 * std::numbers::pi;
-  return angle - kTurn * std::rint(angle / kTurn);
-}
+inline double wrap_angle(double angle) { return angle - kTurn * std::rint(angle / kTurn); }
 
 /// The equivalent angle in [-pi, pi); in its last bits it may differ from `wrap_angle`.
 inline double wrap_below_pi(double angle) {

@@ -5,7 +5,6 @@
 #pragma once
 
 #include <algorithm>
-#include <limits>
 #include <vector>
 
 #include "pushplan/arithmetic.hpp"
@@ -35,8 +34,6 @@ class ConvexFiller {
   void fill(ArrayView<T, 2> image, Polygon polygon, T value);
 
  private:
-  static constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
   /// What a row of pixel centres has in common with the polygon [px].
   struct Run {
     double left = kInfinity;

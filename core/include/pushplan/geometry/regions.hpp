@@ -40,4 +40,8 @@ double region_distance(Vec2 p, const Regions& regions);
 std::vector<Vec2> segment_crossings(std::span<const Segment> first,
                                     std::span<const Segment> second);
 
+/// The points where outlines of the regions cross segments. A shortest path to a region ends at the
+/// region's nearest point or, where an obstacle covers that, at one of these.
+std::vector<Vec2> region_crossings(const Regions& regions, std::span<const Segment> sides);
+
 }  // namespace pushplan

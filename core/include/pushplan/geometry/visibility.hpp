@@ -45,28 +45,30 @@ struct GoalScene {
   double gap;  // distance of paths to obstacles [m]
 };
 
-/// Bends that see each other along a common tangent.
-struct VisiblePairs {
-  struct Pair {
-    Index from;  // less than `to`
+/// The bends of a map that paths can reach, and the lines between those that see each other along a
+/// common tangent.
+class BendGraph {
+ public:
+  /// Of all bends those are left out that lie in an obstacle or out of the box.
+  BendGraph(const Bends& every, const Obstacles& obstacles, const Box& box, double gap);
+
+  Bends bends() const { return {points_, incoming_, outgoing_}; }
+  /// Dijkstra's algorithm (1959) from given first distances (B,) [m], in place, without a heap.
+  /// `parents`, (B,), receives the bend before each whose distance is lowered.
+  void relax(std::span<double> distances, std::span<Index> parents) const;
+  /// (B, B) shortest distances between the bends [m].
+  std::vector<double> distances() const;
+
+ private:
+  std::vector<Vec2> points_;
+  std::vector<Vec2> incoming_;
+  std::vector<Vec2> outgoing_;
+  struct Line {
     Index to;
+    double length;  // [m]
   };
-  std::vector<Pair> pairs;
-  std::vector<double> lengths;  // [m]
+  std::vector<std::vector<Line>> lines_;  // from each bend
 };
-
-VisiblePairs visible_pairs(const Bends& bends, const Obstacles& obstacles, double gap);
-
-/// Arcs of a graph of V nodes, by the node that they leave.
-struct Arcs {
-  std::span<const Index> starts;    // (V + 1,) where the arcs of each node start
-  std::span<const Index> ends;      // (E,) node that each leads to
-  std::span<const double> lengths;  // (E,) [m]
-};
-
-/// Dijkstra's algorithm (1959) from given first distances (V,) [m], in place, without a heap.
-/// `parents`, (V,), receives the node before each whose distance is lowered.
-void relax(const Arcs& arcs, std::span<double> distances, std::span<Index> parents);
 
 /// The straight way to the nearest region that can be seen.
 struct GoalLeg {

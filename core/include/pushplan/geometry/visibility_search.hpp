@@ -74,6 +74,7 @@ class VisibilitySearch {
   void offer(Index node, double length, double bound, Index before, double limit = 0.0);
   void expand(Index node, double length, double low);
   double left(Vec2 p) const;
+  Index bound_next();
 
   Vec2 start_;
   Corners corners_;
@@ -84,6 +85,8 @@ class VisibilitySearch {
   GridSight sight_;
   std::vector<double>
       bounds_;  // (C,) from any corner of an obstacle at least as far to the goal [m]
+  std::size_t bounded_ = 0;
+  bool begun_ = false;
   std::vector<double> lengths_;  // (V + E,) of the shortest path found to each node [m]
   std::vector<Index> parents_;
   std::vector<Entry> heap_;

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "pushplan/interaction/model.hpp"
-#include "pushplan/motion/path_problem.hpp"
+#include "pushplan/motion/swept_path.hpp"
 
 namespace pushplan {
 
@@ -53,26 +53,15 @@ class ArcRollout {
   std::vector<double> moved_;
 };
 
-/// Sweeps the objects along paths, with memory for one thread. The problem and the model have to
-/// outlive it.
+/// The cost of a path that reaches a limit.
+inline constexpr double kTooCostly = std::numeric_limits<double>::infinity();
+
+/// The cost [kg m] of the first `count` poses of a path, whose objects, lengths and works are known up
+/// to the pose `first` and are filled in from there; `kTooCostly` as soon as it reaches `limit`, or
+/// where more than `patience` pairs of objects are tested, as many lie in a heap.
 template <InteractionModel M>
-class PathSweep {
- public:
-  static constexpr double kTooCostly = std::numeric_limits<double>::infinity();
-
-  PathSweep(const PathProblem& problem, M& model)
-      : problem_(problem), model_(model), moved_(model.radii().size()) {}
-
-  /// The cost [kg m] of the first `count` poses of a path, whose objects, lengths and works are
-  /// known up to the pose `first` and are filled in from there; `kTooCostly` as soon as it reaches
-  /// `limit`, or where more than `patience` pairs of objects are tested, as many lie in a heap.
-  double cost(const SweptPath& path, Index first, Index count, double limit, Index patience);
-
- private:
-  const PathProblem& problem_;
-  M& model_;
-  std::vector<double> moved_;
-};
+double sweep_objects(SweptPath& path, Index first, Index count, double limit, Index patience,
+                     const PathProblem& problem, M& model);
 
 // ----------------------------------------------------------------------------
 
@@ -95,27 +84,29 @@ double ArcRollout<M>::roll(const Pose& start, std::span<const Pose> objects, con
 }
 
 template <InteractionModel M>
-double PathSweep<M>::cost(const SweptPath& path, Index first, Index count, double limit,
-                          Index patience) {
-  model_.reset_tests();
-  const double mass = problem_.robot_mass;
-  const double weight = problem_.push_weight;
+double sweep_objects(SweptPath& path, Index first, Index count, double limit, Index patience,
+                     const PathProblem& problem, M& model) {
+  model.reset_tests();
+  const double mass = problem.robot_mass;
+  const double weight = problem.push_weight;
+  const auto known = path.objects_at(first);
+  std::vector<Pose> objects(known.begin(), known.end());
+  std::vector<double> moved(objects.size());
   for (Index n = first + 1; n < count; ++n) {
     const auto here = static_cast<std::size_t>(n);
     const auto before = here - 1;
     const double dx = path.poses[here].x - path.poses[before].x;
     const double dy = path.poses[here].y - path.poses[before].y;
     const Vec2 middle{path.poses[before].x + 0.5 * dx, path.poses[before].y + 0.5 * dy};
-    const double step = std::sqrt(dx * dx + dy * dy) * problem_.price.factor(middle);
+    const double step = std::sqrt(dx * dx + dy * dy) * problem.price.factor(middle);
     path.lengths[here] = path.lengths[before] + step;
-    const auto objects = path.objects.row(n);
-    std::copy_n(path.objects.row(n - 1).begin(), objects.size(), objects.begin());
-    std::fill(moved_.begin(), moved_.end(), 0.0);
-    const bool free = model_.advance(path.poses[before], path.poses[here], objects, moved_);
-    path.works[here] = path.works[before] + work_of(moved_, model_.inverse_masses());
-    if (!free) path.lengths[here] += problem_.jam_length;
+    std::fill(moved.begin(), moved.end(), 0.0);
+    const bool free = model.advance(path.poses[before], path.poses[here], objects, moved);
+    path.put_objects(n, objects);
+    path.works[here] = path.works[before] + work_of(moved, model.inverse_masses());
+    if (!free) path.lengths[here] += problem.jam_length;
     const bool too_costly = mass * path.lengths[here] + weight * path.works[here] >= limit;
-    if (too_costly || model_.tests() > patience) return kTooCostly;
+    if (too_costly || model.tests() > patience) return kTooCostly;
   }
   const auto last = static_cast<std::size_t>(count - 1);
   return mass * path.lengths[last] + weight * path.works[last];

@@ -1,29 +1,53 @@
-// Weights of a grid on which a coarse path trades length against pushing.
+// A coarse shortest path that trades length against pushing: where sampling is worth while.
 #pragma once
 
+#include <memory>
 #include <span>
 
-#include "pushplan/geometry/distance_field.hpp"
-#include "pushplan/geometry/pose.hpp"
+#include "pushplan/geometry/static_map.hpp"
+#include "pushplan/motion/goal_region.hpp"
 
 namespace pushplan {
 
-/// Cells from a first row and column to a last one; they may lie outside of the grid.
-struct CellBox {
-  Index first_column;
-  Index first_row;
-  Index last_column;
-  Index last_row;
+/// What a coarse path knows of a robot.
+struct CoarseRobot {
+  double inscribed;      // radius [m]
+  double circumscribed;  // radius [m]
 };
 
-/// What a polygon adds to the cost of the cells around it.
-struct Surcharge {
-  std::span<const double> reach;   // (K,) distance at which it has faded to 0 [m]
-  std::span<const double> weight;  // (K,) extra cost per metre at the polygon
+class CellSearch;
+
+/// A search for the cheapest path of the robot's centre over a grid. The map has to outlive it.
+class CoarsePath {
+ public:
+  CoarsePath(const StaticMap& map,  // with the margin to keep
+             const CoarseRobot& robot, Vec2 start, const GoalRegion& goal,
+             const Polygons& objects,           // convex parts in the world frame, copied
+             std::span<const double> weights);  // extra cost per metre in each part, infinite for
+                                                // an obstacle
+
+  /// Goes on for about half a millisecond; true when done.
+  bool run();
+  /// Points about one cell apart [m]; none where there is no path, or the search is not done.
+  std::span<const Vec2> points() const;
+
+ private:
+  std::shared_ptr<CellSearch> search_;
 };
 
-/// Adds what polygons add to the cost per metre of each cell. `within` are the cells that each polygon reaches.
-void add_cell_weights(ArrayView<double, 2> extra, const Cells& cells, const Polygons& polygons,
-                       std::span<const CellBox> within, const Surcharge& surcharge);
+/// A search for whether the robot's inscribed disc may get from a start to a goal around walls. The
+/// map has to outlive it.
+class Reachable {
+ public:
+  Reachable(const StaticMap& map, const CoarseRobot& robot, Vec2 start, const GoalRegion& goal);
+
+  /// Goes on for about half a millisecond; true when done.
+  bool run();
+  /// True if it certainly does not get there; known when the search is done.
+  bool is_sealed() const;
+
+ private:
+  std::shared_ptr<CellSearch> search_;  // none where cells are too coarse to tell
+};
 
 }  // namespace pushplan

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "pushplan/geometry/pose.hpp"
+#include "pushplan/geometry/obstacles.hpp"
 
 namespace pushplan {
 
@@ -12,19 +12,6 @@ namespace pushplan {
 struct Footprint {
   Polygons parts;  // [m]
   double radius;   // circumscribed [m]
-};
-
-/// S convex polygons in the world frame, in groups of neighbours.
-struct ConvexObstacles {
-  static constexpr Index kGroup = 16;  // polygons whose boxes are looked at together
-
-  Polygons polygons;            // [m]
-  std::span<const Box> boxes;   // (S,) around each
-  std::span<const Box> groups;  // (ceil(S / kGroup),) around each group
-  Box bounds;                   // the workspace; a pose outside is not free
-
-  Index count() const { return static_cast<Index>(boxes.size()); }
-  Index group_count() const { return static_cast<Index>(groups.size()); }
 };
 
 /// True if a disc comes closer to an obstacle than its radius [m].

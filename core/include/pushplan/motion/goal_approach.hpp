@@ -25,6 +25,11 @@ struct PathEnd {
   std::vector<double> curvatures;  // (M,) that lead to them [1/m]; infinite on the spot
 };
 
+/// The goal, or where the robot does not fit in its middle, tolerances around where it does; none
+/// if it fits nowhere. The parts of its footprint lie within `size` [m] of its origin.
+std::optional<GoalRegion> fitting(const GoalRegion& goal, const Polygons& footprint, double size,
+                                  const ConvexObstacles& walls);
+
 /// The pose from which a straight way of some length [m] leads into the pose of a goal.
 Pose behind(const GoalRegion& goal, double length);
 
@@ -38,5 +43,11 @@ double run_up(const GoalRegion& goal, const EndTurns& turns, double size,
 /// that touches nothing: with a turn on the spot if possible, else a curve. None if there is none.
 std::optional<PathEnd> path_end(const GoalRegion& goal, std::span<const Pose> path,
                                 const EndTurns& turns, double straight, CollisionChecker& checker);
+
+/// The same where the robot fits into the goal, first without a straight way, then after one from
+/// where it has room to turn, on which it may reverse.
+std::optional<PathEnd> end_at_pose(const GoalRegion& goal, std::span<const Pose> path,
+                                   const EndTurns& turns, bool reverses, const Footprint& footprint,
+                                   double size, const ConvexObstacles& walls);
 
 }  // namespace pushplan

@@ -43,6 +43,13 @@ struct GoalRegion {
                                            : -(dx * normal.x + dy * normal.y);
     return std::max(gap, 0.0);
   }
+
+  /// True for a disc of which no point lies in a box.
+  bool is_outside(const Box& box) const {
+    const Vec2 nearest{std::min(std::max(point.x, box.x_min), box.x_max),
+                       std::min(std::max(point.y, box.y_min), box.y_max)};
+    return kind == Kind::kDisc && distance(nearest) > 0.0;
+  }
 };
 
 }  // namespace pushplan

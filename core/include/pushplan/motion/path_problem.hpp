@@ -55,21 +55,4 @@ struct PathProblem {
   PriceGrid price{};
 };
 
-/// A path with the K objects that it sweeps, in memory of somebody else that may be longer than the
-/// poses in use.
-struct SweptPath {
-  std::span<Pose> poses;         // (M,)
-  std::span<double> curvatures;  // (M,) of the arc that leads to each pose [1/m]
-  ArrayView<Pose, 2> objects;    // (M, K) where the objects are when the robot is at each pose
-  std::span<double> lengths;     // (M,) path length so far, at its price [m]
-  std::span<double> works;       // (M,) interaction work so far [kg m]
-
-  PathBuffer buffer() const { return {poses, curvatures}; }
-};
-
-/// Lays the poses of arcs into a path, up to the goal, but all of them where that has a heading.
-/// Returns their number, 0 if there is no room.
-Index lay_out(const Pose& start, std::span<const Arc> arcs, const SweptPath& path,
-              const PathProblem& problem);
-
 }  // namespace pushplan

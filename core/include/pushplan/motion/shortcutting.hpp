@@ -36,63 +36,39 @@ struct ShortcutProposal {
   Index size;   // of all poses
 };
 
-/// Writes a candidate for the first `count` poses of `path` into `trial`, without the objects.
-ShortcutProposal propose_shortcut(const SweptPath& path, Index count, const ShortcutDraw& draw,
+/// Writes a candidate for a path into `trial`, of the same capacity, without the objects.
+ShortcutProposal propose_shortcut(const SweptPath& path, const ShortcutDraw& draw,
                                   const ShortcutShift& shift, const PathProblem& problem,
-                                  const SweptPath& trial);
-
-/// A path that is in use up to `count` poses, and its cost [kg m].
-struct PricedPath {
-  Index count;
-  double cost;
-};
+                                  SweptPath& trial);
 
 /// Pairs of objects that may be tested for one shortcut; that takes some milliseconds.
 inline constexpr Index kShortcutPatience = 1'500;
 
-/// Tries a shortcut for each draw; `path` is changed in place. `trial` is memory of the same size.
+/// Tries a shortcut of a path of some cost, in place. Returns the cost of the path then.
 template <InteractionModel M>
-PricedPath shortcut(const SweptPath& path, PricedPath known, std::span<const ShortcutDraw> draws,
-                    std::span<const ShortcutShift> shifts, const SweptPath& trial,
-                    const PathProblem& problem, M& model) {
-  CollisionChecker checker(problem.footprint, problem.walls);
-  PathSweep<M> sweep(problem, model);
-  auto [count, cost] = known;
-  for (std::size_t i = 0; i < draws.size() && count >= 4; ++i) {
-    const auto [first, added, size] =
-        propose_shortcut(path, count, draws[i], shifts[i], problem, trial);
-    if (size == 0) continue;
-    const auto from = static_cast<std::size_t>(first);
-    const auto end = static_cast<std::size_t>(size);
-    // no sweep can make up for a path that is too long by itself
-    double length = path.lengths[from];
-    for (std::size_t n = from + 1; n < end; ++n) {
-      const double dx = trial.poses[n].x - trial.poses[n - 1].x;
-      const double dy = trial.poses[n].y - trial.poses[n - 1].y;
-      length += std::sqrt(dx * dx + dy * dy);
-    }
-    if (problem.robot_mass * length + problem.push_weight * path.works[from] >= cost) continue;
-    const auto fresh = trial.poses.subspan(from + 1, static_cast<std::size_t>(added));
-    if (checker.first_blocked(fresh) < added) continue;
-    trial.lengths[from] = path.lengths[from];
-    trial.works[from] = path.works[from];
-    std::copy_n(path.objects.row(first).begin(), path.objects.extent(1),
-                trial.objects.row(first).begin());
-    const double found = sweep.cost(trial, first, size, cost, kShortcutPatience);
-    if (!(found < (1.0 - 1e-9) * cost)) continue;
-    for (std::size_t n = from + 1; n < end; ++n) {
-      path.poses[n] = trial.poses[n];
-      path.curvatures[n] = trial.curvatures[n];
-      path.lengths[n] = trial.lengths[n];
-      path.works[n] = trial.works[n];
-      const auto row = static_cast<Index>(n);
-      std::copy_n(trial.objects.row(row).begin(), path.objects.extent(1),
-                  path.objects.row(row).begin());
-    }
-    cost = found;
-    count = size;
+double shortcut(SweptPath& path, double cost, const ShortcutDraw& draw, const ShortcutShift& shift,
+                SweptPath& trial, const PathProblem& problem, M& model) {
+  if (path.count < 4) return cost;
+  const auto [first, added, size] = propose_shortcut(path, draw, shift, problem, trial);
+  if (size == 0) return cost;
+  trial.count = size;
+  trial.begin_at(first, path);
+  // no sweep can make up for a path that is too long by itself
+  const auto from = static_cast<std::size_t>(first);
+  double length = path.lengths[from];
+  for (std::size_t n = from + 1; n < trial.used().size(); ++n) {
+    const double dx = trial.poses[n].x - trial.poses[n - 1].x;
+    const double dy = trial.poses[n].y - trial.poses[n - 1].y;
+    length += std::sqrt(dx * dx + dy * dy);
   }
-  return {count, cost};
+  if (problem.robot_mass * length + problem.push_weight * path.works[from] >= cost) return cost;
+  CollisionChecker checker(problem.footprint, problem.walls);
+  const auto fresh = trial.used().subspan(from + 1, static_cast<std::size_t>(added));
+  if (checker.first_blocked(fresh) < added) return cost;
+  const double found = sweep_objects(trial, first, size, cost, kShortcutPatience, problem, model);
+  if (!(found < (1.0 - 1e-9) * cost)) return cost;
+  path.take(trial, first);
+  return found;
 }
 
 }  // namespace pushplan

@@ -32,4 +32,14 @@ struct SpeedProfile {
 void fill_speed_profile(const Path& path, std::span<const double> chords, const SpeedLimits& limits,
                         const SpeedProfile& profile);
 
+/// The same of an omnidirectional robot, which drives straight from pose to pose and turns
+/// meanwhile; at first it moves at a velocity in the world frame [m/s]. Where turns on the spot
+/// begin too suddenly for it, the whole profile is slower.
+void fill_sliding_profile(std::span<const Pose> poses, const SpeedLimits& limits, Vec2 velocity,
+                          const SpeedProfile& profile);
+
+/// The greatest change of turn rate between two steps, each of which takes half of it [rad/s^2].
+/// `turn_rates` [rad/s] and `times` [s] are those of a profile.
+double turn_acceleration(std::span<const double> turn_rates, std::span<const double> times);
+
 }  // namespace pushplan

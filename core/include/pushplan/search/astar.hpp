@@ -51,7 +51,6 @@ class AStar {
       const Index node = tree_.take();
       const double here = tree_.cost(node);
       lattice_.expand(node, [&](Index successor, double edge_cost, Index edge) {
-        ++generated_;
         const double cost = here + edge_cost;
         if (!tree_.known(successor) || cost < tree_.cost(successor)) {
           tree_.offer(successor, cost, lattice_.estimate(successor), node, edge);
@@ -66,7 +65,6 @@ class AStar {
     lattice_ = std::move(lattice);
     tree_.clear();
     goal_ = -1;
-    generated_ = 0;
   }
 
   L& lattice() { return lattice_; }
@@ -74,8 +72,6 @@ class AStar {
   const SearchTree& tree() const { return tree_; }
   /// The goal that was reached, -1 before.
   Index goal() const { return goal_; }
-  /// Number of edges looked at.
-  Index generated() const { return generated_; }
   /// Cost of the path to the goal, infinite before it is reached.
   double cost() const {
     return goal_ >= 0 ? tree_.cost(goal_) : std::numeric_limits<double>::infinity();
@@ -85,7 +81,6 @@ class AStar {
   L lattice_;
   SearchTree tree_;
   Index goal_ = -1;
-  Index generated_ = 0;
 };
 
 }  // namespace pushplan

@@ -2,14 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "pushplan/arithmetic.hpp"
 
 namespace pushplan {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kSpread = 5;  // curvatures that are spread evenly
 
 }  // namespace

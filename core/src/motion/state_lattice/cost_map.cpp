@@ -2,16 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "pushplan/arithmetic.hpp"
 
 namespace pushplan {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 CellSpan rows_of(Polygon outline) {
   CellSpan rows{outline[0].x, outline[0].x};

@@ -7,8 +7,6 @@
 namespace pushplan {
 namespace {
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 /// Lets each value be reached from the others at `cost` for each cell across.
 void drift(std::span<double> values, double cost) {
   if (values.empty()) return;

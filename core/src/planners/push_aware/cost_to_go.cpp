@@ -1,8 +1,6 @@
 #include "pushplan/planners/push_aware/cost_to_go.hpp"
 
 #include <cmath>
-#include <limits>
-#include <numbers>
 #include <utility>
 
 #include "pushplan/arithmetic.hpp"
@@ -12,8 +10,6 @@
 namespace pushplan {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kLeastWeight = 0.25;  // of the cells with a value, for an interpolated one
 constexpr double kSome = 1e-9;         // weight from which a cell counts
 constexpr double kLargest = 1e9;       // change of a value that was infinite [m]

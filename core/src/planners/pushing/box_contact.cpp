@@ -1,11 +1,8 @@
 #include "pushplan/planners/pushing/box_contact.hpp"
 
-#include <limits>
 
 namespace pushplan::pushing {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// The bumper's velocity in the frame of the pushed face.
 struct FaceVelocity {

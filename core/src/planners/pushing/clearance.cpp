@@ -1,13 +1,10 @@
 #include "pushplan/planners/pushing/clearance.hpp"
 
-#include <limits>
-
 #include "pushplan/geometry/convex.hpp"
 
 namespace pushplan::pushing {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kSamples = 4.0;  // poses checked along one command
 constexpr int kHalvings = 4;      // of the piece in which robot or box comes too near
 // greatest rate at which a box nearer than the clearance may come nearer, per travel of the bumper:

@@ -3,14 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <utility>
 
 namespace pushplan::pushing {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // angle at which another face is taken to be the pushed one [rad]
 constexpr double kFaceTurned = std::numbers::pi * 50.0 / 180.0;
 constexpr double kPoseJump =

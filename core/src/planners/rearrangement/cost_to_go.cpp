@@ -1,13 +1,13 @@
 #include "pushplan/planners/rearrangement/cost_to_go.hpp"
 
 #include <algorithm>
-#include <limits>
+
+#include "pushplan/arithmetic.hpp"
 
 namespace pushplan::rearrangement {
 
 void fill_cost_to_go(ArrayView<const double, 2> costs, std::span<const Index> delivers,
                      Index objects, const CostToGo& table) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const Index count = static_cast<Index>(delivers.size());
   const Index every = (Index{1} << objects) - 1;
   std::fill_n(table.costs.data(), table.costs.size(), kInfinity);

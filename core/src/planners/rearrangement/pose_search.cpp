@@ -1,15 +1,11 @@
 #include "pushplan/planners/rearrangement/pose_search.hpp"
 
 #include <algorithm>
-#include <limits>
 
 namespace pushplan::rearrangement {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kBucketWidth = 0.1;  // [cells]
-
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 }  // namespace
 

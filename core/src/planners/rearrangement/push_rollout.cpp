@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace pushplan::rearrangement {
 namespace {
@@ -71,7 +70,6 @@ void PushRollout::write(const RolloutLog& log, RolloutSize& size) const {
 RolloutSize PushRollout::run(const Pose& start, std::span<const Pose> poses,
                              const PushAttempt& attempt, const PushingController& controller,
                              const RolloutLog& log) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   std::ranges::copy(poses, poses_.begin());
   std::ranges::fill(lengths_, 0.0);
   for (std::size_t k = 0; k < poses.size(); ++k) {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 #include "pushplan/geometry/convex.hpp"
@@ -10,7 +9,6 @@
 namespace pushplan::rearrangement {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kPi = std::numbers::pi;
 constexpr double kSureTurn = 170.0 * (kPi / 180.0);  // up to here a turn is made the shorter way if
                                                      // nothing is said [rad]
@@ -18,8 +16,6 @@ constexpr double kLittleTurn = 0.6;  // a turn by less is not made the longer wa
 constexpr double kTightCost = 25.0;  // of driving on where the robot begins nearer to something
                                      // static than it should be
 constexpr double kRounding = 1.0 + 1e-12;  // on limits, so that sums in another order stay below
-
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 }  // namespace
 

@@ -8,8 +8,6 @@ namespace {
 
 constexpr double kThrough = 0.9;  // changes below this lead through a displaced pose
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 /// Another end on the line, `aside` [m] beside the one that there is.
 Pose displace_end(const Pose& end, double aside, const ChangeDraw& draw, const ChangeShift& shift,
                   const ChangeProblem& problem) {

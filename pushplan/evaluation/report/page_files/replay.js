@@ -1,5 +1,5 @@
 // Recorded episodes, drawn: scrubbed, played, two of a scenario side by side in step.
-const replays = new Map(); // job -> what replays.py packed
+const replays = new Map(); // job -> what page.py packed
 for (const one of document.querySelectorAll("script.replay")) {
   const found = JSON.parse(one.textContent);
   replays.set(found.job, found);

@@ -7,14 +7,15 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
-from shapely import Polygon
 
+from pushplan.core import motion as core
 from pushplan.geometry import gyration_squares
 from pushplan.planners.pushing import Bumper, PushModel, PushParameters, faces_of
 from pushplan.world import Movables, RobotModel
-from pushplan.world.checks import FloatArray, IntArray
+from pushplan.world.checks import FloatArray
 from pushplan.world.outline import convex_outline, flatten, transform
 
 _FRACTION = 0.7  # of the stable curvature that is used
@@ -23,8 +24,16 @@ MARGIN = 0.07  # that robot and object keep from other objects [circumscribed ra
 _BESIDE = 0.8  # offset of a contact beside the middle, of what keeps the face on the bumper
 _STRAIGHT = 1e-3  # curvature below which a face does not hold [1/circumscribed radii]
 
-Body = tuple[FloatArray, IntArray, float]
-"""Corners (V, 2), the first of each convex part, and the circumscribed radius [m]."""
+
+class Body(core.Footprint):
+    """Convex parts (N, 2) in one frame, grown by a margin [m], as something that can be copied."""
+
+    def __init__(self, parts: Sequence[FloatArray], margin: float) -> None:
+        super().__init__(core.OwnFootprint(*flatten(parts), margin))
+        self._made_of = parts, margin
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Body, self._made_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +47,7 @@ class Contact:
         model: of the push.
         radius: least turning radius of the two [m].
         object_pose: (3,) of the object in the robot's frame.
-        body: robot and object, in the robot's frame; arguments of `core.Footprint`.
+        body: robot and object, in the robot's frame.
         wide: the same, grown by what they keep from other objects.
     """
 
@@ -107,17 +116,9 @@ def _contacts(
             pose = np.array([model.reach, middle + offset, -face.normal])
             parts = [*robot.wall_parts, transform(pose, outline)]
             turning = max(1.0 / curvature + abs(offset), robot.min_turning_radius)
-            bodies = body_of(parts, 0.0), body_of(parts, MARGIN * size)
+            bodies = Body(parts, 0.0), Body(parts, MARGIN * size)
             found.append(Contact(model, turning, pose, *bodies))
     return tuple(found)
-
-
-def body_of(parts: Sequence[FloatArray], margin: float) -> Body:
-    """Convex parts (N, 2) in one frame, grown by a margin [m]."""
-    rings = [Polygon(part).buffer(margin, join_style="mitre").exterior for part in parts]
-    grown = [convex_outline("body", np.asarray(ring.coords)[:-1]) for ring in rings]
-    vertices, offsets = flatten(grown)
-    return vertices, offsets, float(np.hypot(*vertices.T).max())
 
 
 def compose(frame: FloatArray, pose: FloatArray) -> FloatArray:

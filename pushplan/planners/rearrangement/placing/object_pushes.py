@@ -108,7 +108,7 @@ class ObjectPushes:
                 continue
             tried += 1
             most = min(_LONGEST * scene.size, 3.0 * length + 10.0 * scene.size)
-            checker = core.CollisionChecker(core.Footprint(*contact.body), scene.among(k))
+            checker = core.CollisionChecker(contact.body, scene.among(k))
             bounds = scene.world.static.bounds
             poses = way_around(scene.pushes(contact), start, target, checker, bounds, most)
             found = None if poses is None else self.part(k, contact, poses)
@@ -275,7 +275,7 @@ class ObjectPushes:
         """Checks robot and object together, among what is static or all other objects."""
         key = k, id(contact), others
         if key not in self._checkers:
-            body = core.Footprint(*(contact.wide if others else contact.body))
+            body = contact.wide if others else contact.body
             among = self._scene.objects_but(k) if others else self._scene.walls
             self._checkers[key] = core.CollisionChecker(body, among)
         return self._checkers[key]

@@ -28,7 +28,7 @@ class Part(NamedTuple):
 
     def passes(self, pose: FloatArray, radius: float) -> bool:
         """True if robot or object may come so near to a point [m]."""
-        reach = radius + self.contact.wide[2]
+        reach = radius + self.contact.wide.radius
         x, y = pose[:2].tolist()
         return any(
             float(((poses[:, 0] - x) ** 2 + (poses[:, 1] - y) ** 2).min()) < reach * reach

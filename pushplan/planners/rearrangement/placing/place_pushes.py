@@ -179,7 +179,7 @@ class PlacePushes:
         there = obstacles(scene.empty, [transform(pose, part) for part in scene.movables.parts(k)])
         alone = core.CollisionChecker(scene.alone_body, there)
         return all(
-            is_clear(core.CollisionChecker(core.Footprint(*part.contact.wide), there), part.poses)
+            is_clear(core.CollisionChecker(part.contact.wide, there), part.poses)
             and is_clear(alone, part.runs)
             for part in near
         )
@@ -236,8 +236,9 @@ class PlacePushes:
                 space = min((shape.distance(other) for other in others), default=math.inf)
                 cost = _SPACE_COST * max(0.0, 1.0 - space / (_SPACE * size))
                 if not free:
-                    body = core.Footprint(*contact.body)
-                    touched = not is_clear(core.CollisionChecker(body, scene.among(k)), poses)
+                    touched = not is_clear(
+                        core.CollisionChecker(contact.body, scene.among(k)), poses
+                    )
                     cost += _SHOVES if touched else _TIGHT
                 if scene.done[k]:
                     cost += _DONE

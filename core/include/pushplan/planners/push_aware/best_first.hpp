@@ -65,8 +65,7 @@ class PushLattice {
   const PathProblem& problem() const { return rollout_.problem(); }
   bool in_goal(const Pose& pose) const { return problem().goal.contains({pose.x, pose.y}); }
 
-  Index signature(std::span<const Pose> objects) const;
-  Index cell_of(const Pose& pose, Index signature) const;
+  Index cell_of(const Pose& pose) const;
   bool settle(PushTree::Node& node, double length);
   bool drive_to(PushTree::Node& node);
   template <class Visit>
@@ -81,28 +80,11 @@ class PushLattice {
 
 // ----------------------------------------------------------------------------
 
-/// Folds the set of objects that have been moved into a number.
 template <InteractionModel M>
-Index PushLattice<M>::signature(std::span<const Pose> objects) const {
-  const Index count = tree_->cells().signatures;
-  if (count == 1) return 0;
-  const auto start = tree_->objects(0);
-  const auto radii = rollout_.model().radii();
-  std::uint64_t code = 0;
-  for (std::size_t k = 0; k < objects.size(); ++k) {
-    const double dx = objects[k].x - start[k].x;
-    const double dy = objects[k].y - start[k].y;
-    const double still = 0.1 * radii[k];
-    if (dx * dx + dy * dy > still * still) code = code * 31 + k + 1;
-  }
-  return floor_mod(static_cast<Index>(code), count);
-}
-
-template <InteractionModel M>
-Index PushLattice<M>::cell_of(const Pose& pose, Index signature) const {
+Index PushLattice<M>::cell_of(const Pose& pose) const {
   const PushTree::CellShape& shape = tree_->cells();
   const Index place = table_.row_of(pose.y) * shape.columns + table_.column_of(pose.x);
-  return (place * shape.headings + table_.heading_of(pose.theta)) * shape.signatures + signature;
+  return place * shape.headings + table_.heading_of(pose.theta);
 }
 
 /// Writes down what a node really costs. False if its cell has a cheaper one.
@@ -117,8 +99,7 @@ bool PushLattice<M>::settle(PushTree::Node& node, double length) {
   const double cost = parent.cost + problem().robot_mass * priced + problem().push_weight * work;
   const bool goal = in_goal(node.pose);
   if (!goal) {
-    const auto objects = work > 0.0 ? rollout_.objects() : tree.objects(parent.row);
-    double& best = tree.best(cell_of(node.pose, signature(objects)));
+    double& best = tree.best(cell_of(node.pose));
     if (cost >= best) return false;
     best = cost;
   }
@@ -158,7 +139,7 @@ void PushLattice<M>::expand(Index number, Visit&& visit) {
     return;
   }
   if (node.parent >= 0) {
-    const double best = tree.best(cell_of(node.pose, signature(tree.objects(node.row))));
+    const double best = tree.best(cell_of(node.pose));
     if (node.cost > best * (1.0 + 1e-12)) return;  // a cheaper node has taken its cell since
   }
   branch(at, visit);
@@ -179,7 +160,7 @@ void PushLattice<M>::branch(Index at, Visit& visit) {
     double left = 0.0;
     if (!in_goal(next.pose)) {
       left = table_.length_to_go(next.pose);
-      if (tree.cells().signatures == 1 && cost >= tree.best(cell_of(next.pose, 0))) continue;
+      if (cost >= tree.best(cell_of(next.pose))) continue;
     }
     if (!(cost + branching_.pruning_factor * mass * left < bound_)) continue;
     next.cost = cost;

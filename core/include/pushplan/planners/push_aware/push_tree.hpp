@@ -32,9 +32,8 @@ class PushTree {
     Index rows = 1;
     Index columns = 1;
     Index headings = 1;
-    Index signatures = 1;  // of sets of objects that have been moved
 
-    Index count() const { return rows * columns * headings * signatures; }
+    Index count() const { return rows * columns * headings; }
   };
 
   PushTree(Index nodes,    // at most

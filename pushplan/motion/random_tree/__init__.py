@@ -1,1 +1,0 @@
-"""Random trees of drivable arcs, grown by OMPL."""
