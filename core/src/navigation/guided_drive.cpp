@@ -75,8 +75,7 @@ std::vector<Arc> curves_through(const PathImprover& improver, std::span<const Po
 /// The map with objects among what is static.
 std::shared_ptr<const StaticMap> with_objects(const PathImprover& improver) {
   const StaticMap& map = *improver.problem().map;
-  OwnPolygons polygons;
-  for (Index k = 0; k < map.polygons().count(); ++k) polygons.add(map.polygons()[k]);
+  OwnPolygons polygons = copy_of(map.polygons());
   const std::vector<Pose>& objects = improver.problem().objects;
   for (std::size_t k = 0; k < objects.size(); ++k) {
     improver.session().scene.place_parts(k, objects[k], polygons);
@@ -120,7 +119,8 @@ class GuidedDrive {
   Task<Fault> first_fault();
   Task<bool> arrives(double cost);
   Task<bool> search_around(Index fault, double reach);
-  Index end_from(double along, std::span<const Pose> objects) const;
+  Index end_from(std::span<const double> lengths, double along,
+                 std::span<const Pose> objects) const;
   std::vector<double> lengths() const;
 
   PathImprover& improver_;
@@ -206,10 +206,11 @@ Task<bool> GuidedDrive::arrives(double cost) {
   co_return improver_.solved();
 }
 
-/// The first pose from a length [m] on at which there is room for the robot.
-Index GuidedDrive::end_from(double along, std::span<const Pose> objects) const {
+/// The first pose from a length [m] on at which there is room for the robot; `lengths` are those
+/// driven up to each pose.
+Index GuidedDrive::end_from(std::span<const double> lengths, double along,
+                            std::span<const Pose> objects) const {
   const double room = kRoom * improver_.size();
-  const std::vector<double> lengths = this->lengths();
   const auto& radii = session_.scene.radii;
   const ConvexObstacles walls = improver_.problem().map->walls();
   for (Index n = std::ranges::lower_bound(lengths, along) - lengths.begin(); n + 1 < path_.count; ++n) {
@@ -251,7 +252,7 @@ Task<bool> GuidedDrive::search_around(Index fault, double reach) {
   const Index first = std::max<Index>(before - 1, 0);
   const auto row = path_.objects_at(first);
   Problem part{nullptr, path_.poses[static_cast<std::size_t>(first)], {row.begin(), row.end()}, improver_.goal()};
-  const Index last = end_from(at + reach * size, part.objects);
+  const Index last = end_from(along, at + reach * size, part.objects);
   const bool is_last = last == path_.count - 1;
   const Pose& end = path_.poses[static_cast<std::size_t>(last)];
   if (!is_last) part.goal = {GoalRegion::Kind::kDisc, {end.x, end.y}, {}, kWindowGoal * size};

@@ -8,7 +8,6 @@ namespace pushplan {
 namespace {
 
 constexpr double kWeightSpread = 0.7;   // of the weight of pushing from round to round
-constexpr double kUnsolvedInflation = 1.3;
 constexpr double kLargeTurn = 0.5;      // on the spot, from which on arcs without it are a detour [rad]
 constexpr double kPatience = 20.0;      // times the usual rounds of the contact solver
 constexpr int kCurveTries = 4;          // along the shortest path; the last ones turn most sharply
@@ -113,7 +112,7 @@ Task<bool> PathPlanner::Call::first_plan() {
     const bool useful = co_await searches.make_table();
     if (!useful) continue;
     trees.relax();  // where a first tree fails, the start is most often a tight one
-    co_await searches.search(kUnsolvedInflation);
+    co_await searches.search(kUnsolvedRatio);
   }
   status = trees.boxed_in() ? PlanStatus::kStartBlocked : PlanStatus::kGoalUnreachable;
   co_return false;

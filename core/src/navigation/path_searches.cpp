@@ -15,8 +15,6 @@ constexpr Index kNodes = 100'000;    // of one search at most
 constexpr double kMemory = 48.0;     // of the objects' poses in one search at most [MiB]
 constexpr Index kExpansions = 30;    // half the arcs driven at most between two pauses
 constexpr double kSlack = 1.05;  // cost of a path of a search, over the best, that is shortcut
-constexpr double kUnsolvedRatio = 1.3;  // cost of a plan over that of its path without objects, where
-                                        // none is known
 constexpr double kMostRatio = 2.0;  // the same at most: more inflation would make searches greedy
 
 }  // namespace
@@ -25,12 +23,8 @@ constexpr double kMostRatio = 2.0;  // the same at most: more inflation would ma
 struct PathSearches::Table {
   Table(Polygons wall_parts, const ConvexObstacles& walls, const GoalRegion& goal, double size,
         double radius)
-      : maker(copied(wall_parts, size), walls, goal, size, radius) {}
+      : parts(copy_of(wall_parts)), maker({parts.polygons(), size}, walls, goal, size, radius) {}
 
-  Footprint copied(Polygons wall_parts, double size) {
-    for (Index k = 0; k < wall_parts.count(); ++k) parts.add(wall_parts[k]);
-    return {parts.polygons(), size};
-  }
   /// True if there is nothing more to do.
   bool step() {
     const std::lock_guard lock(mutex);

@@ -5,6 +5,9 @@
 
 namespace pushplan {
 
+/// The cost of a plan over that of its path without objects, where none is known.
+inline constexpr double kUnsolvedRatio = 1.3;
+
 /// Best-first searches over a table of lengths to the goal.
 class PathSearches {
  public:

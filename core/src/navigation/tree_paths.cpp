@@ -158,19 +158,20 @@ Task<std::optional<Lead>> TreePaths::start_turn(Lead before) {
 Task<std::optional<Lead>> TreePaths::drive_to_turn() {
   const Room usual = improver_.room();
   const Pose& start = improver_.problem().start;
-  OwnPolygons shapes;  // walls, and the objects where they are at first
-  const Polygons walls = improver_.problem().map->parts();
-  for (Index k = 0; k < walls.count(); ++k) shapes.add(walls[k]);
   const std::vector<Pose>& objects = improver_.problem().objects;
-  for (std::size_t k = 0; k < objects.size(); ++k) {
-    session_.scene.place_parts(k, objects[k], shapes);
+  std::optional<OwnObstacles> among;  // walls, and the objects where they are at first
+  if (!objects.empty()) {
+    OwnPolygons shapes = copy_of(improver_.problem().map->parts());
+    for (std::size_t k = 0; k < objects.size(); ++k) {
+      session_.scene.place_parts(k, objects[k], shapes);
+    }
+    among.emplace(shapes.polygons(), usual.walls.bounds);
   }
-  const OwnObstacles among(shapes.polygons(), usual.walls.bounds);
   std::vector<Room> rooms;
   for (const bool around : {true, false}) {
-    if (around && objects.empty()) continue;
+    if (around && !among) continue;
     Room room = usual;
-    if (around) room.walls = among.view();
+    if (around) room.walls = among->view();
     rooms.push_back(room);
     room.footprint = bare_room().footprint;
     rooms.push_back(room);
